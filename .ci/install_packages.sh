@@ -17,6 +17,7 @@ for argument in "$@"; do
       packages+=(
         ccache libgtest-dev libopenmesh-dev python3
         glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # compile the GLSL of vertex16 and run it on the CPU
+        xvfb xdotool libgl1-mesa-dri # the viewer in a window: a display, keys and mouse, OpenGL in software
         dpkg-dev file # Debian packages of packtrace itself
       ) ;;
     benchmarks) packages+=(libbenchmark-dev libopenmesh-dev libmeshoptimizer-dev) ;; # what packtrace is compared with

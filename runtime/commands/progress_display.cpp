@@ -36,6 +36,14 @@ std::string progress_text(std::string_view phase, uint64_t done, uint64_t total,
   return text;
 }
 
+Progress::Observer both(Progress::Observer first, Progress::Observer second) {
+  if (!first) return second;
+  return [a = std::move(first), b = std::move(second)](std::string_view phase, uint64_t done, uint64_t total) {
+    a(phase, done, total);
+    b(phase, done, total);
+  };
+}
+
 ProgressDisplay::ProgressDisplay(const GlobalOptions& globals)
     : ProgressDisplay(Config{stderr, is_terminal(stderr), globals.quiet, {}}) {}
 

@@ -18,6 +18,9 @@ struct GlobalOptions;
 /// @param total 0: unknown
 std::string progress_text(std::string_view phase, uint64_t done, uint64_t total, double elapsed_s);
 
+/// An observer that calls both, the first unless it is empty.
+Progress::Observer both(Progress::Observer first, Progress::Observer second);
+
 /// Displays a Progress on standard error. On a terminal there is one line per phase that updates in place. Otherwise a
 /// plain line is printed every kPlainInterval, and at the end of phases of at least kMinPlainPhase.
 /// The object must outlive the Progress that it observes.

@@ -26,13 +26,16 @@ namespace {
 constexpr uint64_t kMaxScriptBytes = uint64_t{1} << 26;
 constexpr ImageSize kWindow{960, 540}; ///< unless --size says another
 
+ImageSize view_size(const ViewOptions& options) {
+  return options.render.size.empty() ? kWindow : parse_size(options.render.size);
+}
+
 /// Loads the files and makes the view of them.
-std::unique_ptr<ViewSession> make_session(const ViewOptions& options, const GlobalOptions& globals) {
-  ProgressDisplay display(globals);
-  Progress progress(display.observer());
+std::unique_ptr<ViewSession> make_session(const ViewOptions& options, const GlobalOptions& globals,
+                                          ProgressDisplay& display, Progress& progress) {
   const DetailConfig detail = detail_config(options.render.lod, false);
   ViewSession::Config config;
-  config.size = options.render.size.empty() ? kWindow : parse_size(options.render.size);
+  config.size = view_size(options);
   config.frame = frame_config(options.render, detail);
   config.frame.size = config.size;
   config.frame.validate();
@@ -42,7 +45,6 @@ std::unique_ptr<ViewSession> make_session(const ViewOptions& options, const Glob
   for (const std::string& name : options.files)
     files.push_back(load_view_file(name, options.render, globals, detail, progress, display));
   ViewCamera camera = start_camera(files.front(), options.render, globals);
-  display.finish();
   return std::make_unique<ViewSession>(std::move(files), std::move(camera), config);
 }
 
@@ -62,6 +64,21 @@ void find_pivot(ViewSession& session, const ViewOptions& options, const GlobalOp
   }
   session.set_pivot(size.width / 2, size.height / 2);
   session.restart();
+}
+
+/// Makes the session as the viewer begins with it.
+/// @param observer gets the progress, besides standard error; may be empty
+std::unique_ptr<ViewSession> start_session(const ViewOptions& options, const GlobalOptions& globals,
+                                           const Progress::Observer& observer) {
+  ProgressDisplay display(globals);
+  Progress progress(observer ? both(display.observer(), observer) : display.observer());
+  std::unique_ptr<ViewSession> session = make_session(options, globals, display, progress);
+  session->keep_views(!options.profile || options.script); // picks show them
+  display.finish();
+  Progress first_frame(observer);
+  find_pivot(*session, options, globals, first_frame);
+  if (options.settings) restore_settings(*options.settings, *session);
+  return session;
 }
 
 /// Runs the profile and writes its table. Returns its report.
@@ -97,20 +114,22 @@ int run_viewer(const ViewOptions& options, const GlobalOptions& globals) {
     script = parse_script({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, *options.script);
   }
   JsonOutput json(globals.json, globals.force);
-  std::unique_ptr<ViewSession> session = make_session(options, globals);
-  Progress progress;
-  session->keep_views(!options.profile || options.script); // picks show them
-  find_pivot(*session, options, globals, progress);
-  if (options.settings) restore_settings(*options.settings, *session);
   ViewOutputs outputs(globals);
   nlohmann::json result = {{"verb", "view"}, {"inputs", options.files}};
+  const bool window = !options.script && !options.profile;
+  if (window) {
+    show_in_window(
+        view_size(options),
+        [&](const Progress::Observer& observer) { return start_session(options, globals, observer); }, options, globals,
+        outputs);
+    result["results"] = outputs.results();
+  }
+  std::unique_ptr<ViewSession> session;
+  if (!window) session = start_session(options, globals, {});
+  Progress progress;
   if (options.script) {
     ViewControls controls(*session);
     run_script(script, *options.script, *session, controls, outputs, progress);
-    result["results"] = outputs.results();
-  }
-  if (!options.script && !options.profile) {
-    show_in_window(std::move(session), options, globals, outputs);
     result["results"] = outputs.results();
   }
   if (options.profile) {

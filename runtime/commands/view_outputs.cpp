@@ -35,6 +35,7 @@ void ViewOutputs::save_text(const std::string& file, const std::string& text) {
 }
 
 void ViewOutputs::report(const nlohmann::json& result) {
+  const std::lock_guard lock(mutex_);
   const bool json_to_stdout = globals_.json == "-";
   if (!globals_.quiet && !json_to_stdout)
     print_printable(result.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -18,13 +19,14 @@ public:
   void save_pane(ViewSession& session, size_t pane, const std::vector<std::string>& files) override;
   void save_screen(ViewSession& session, const std::string& file) override;
   void save_text(const std::string& file, const std::string& text) override;
-  /// Prints the result as a line of JSON, unless quiet, and keeps it.
+  /// Prints the result as a line of JSON, unless quiet, and keeps it. May be called from any thread.
   void report(const nlohmann::json& result) override;
 
   const nlohmann::json& results() const { return results_; }
 
 private:
   const GlobalOptions& globals_;
+  std::mutex mutex_; ///< of the output and results_
   nlohmann::json results_ = nlohmann::json::array();
 };
 

@@ -1,5 +1,6 @@
 #include "runtime/commands/view_window.h"
 
+#include <atomic>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "runtime/commands/file_watch.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/commands/view_files.h"
+#include "runtime/stopwatch.h"
 #include "runtime/view/frame_thread.h"
 #include "runtime/view/profile.h"
 #include "runtime/view/window/settings_file.h"
@@ -41,6 +43,8 @@ public:
         watch_([this](size_t file) { reload(file); }) {
     for (const std::string& name : names_) watch_.add(name);
   }
+  /// Ends what is being loaded.
+  ~WindowFiles() { closing_ = true; }
 
   void screenshot(ViewSession& session) {
     const std::string base = free_name(session.files()[session.pane(0).file].name, {".png", ".exr"});
@@ -51,7 +55,8 @@ public:
     save_pane(session, 0, base + "-first");
     save_pane(session, 1, base + "-second");
     outputs_.save_screen(session, base + ".png");
-    frames_.set_message("saved " + base + ".png, and both views beside it");
+    outputs_.report({{"screen", base + ".png"}});
+    frames_.set_status("saved " + base + ".png, and both views beside it");
   }
 
   void record(ViewSession& session, ViewControls& controls) {
@@ -83,10 +88,9 @@ public:
 
   /// Loads a file and shows it in the first pane.
   void open(const std::string& name) {
-    frames_.set_message("loading " + name);
     watch_.run([this, name] {
-      load(name, [this, name](ViewFile file) {
-        frames_.post([file = std::move(file)](ViewSession& session, ViewControls&) {
+      load(name, [this, name](const ViewFile& file, const ViewCamera&) {
+        frames_.post([file](ViewSession& session, ViewControls&) {
           session.add_file(file);
           session.set_file(0, session.files().size() - 1);
         });
@@ -103,14 +107,14 @@ private:
     outputs_.save_pane(session, pane, files);
     const std::vector<std::string> command = session.command(pane);
     outputs_.report({{"screenshot", files}, {"pane", pane}, {"command", command}});
-    frames_.set_message("saved " + base + ".png and .exr" +
-                        (command.empty() ? ": a moving picture has no command" : ": " + command_text(command)));
+    frames_.set_status("saved " + base + ".png and .exr" +
+                       (command.empty() ? ": a moving picture has no command" : ": " + command_text(command)));
   }
 
   void reload(size_t index) {
-    load(names_[index], [this, index](ViewFile file) {
+    load(names_[index], [this, index](const ViewFile& file, const ViewCamera& start) {
       frames_.post(
-          [index, file = std::move(file)](ViewSession& session, ViewControls&) { session.replace_file(index, file); });
+          [index, file, start](ViewSession& session, ViewControls&) { session.replace_file(index, file, start); });
       frames_.set_message("read " + names_[index] + " again");
     });
   }
@@ -121,10 +125,16 @@ private:
   void load(const std::string& name, const Loaded& loaded) {
     try {
       ProgressDisplay display(globals_);
-      Progress progress(display.observer());
-      loaded(load_view_file(name, options_.render, globals_, detail_config(options_.render.lod, false), progress,
-                            display));
+      const Stopwatch watch;
+      Progress progress(both(display.observer(), [&](std::string_view phase, uint64_t done, uint64_t total) {
+        if (closing_) throw Error(ErrorKind::kCancelled, "the window was closed");
+        frames_.set_status("loading " + name + ", " + progress_text(phase, done, total, watch.seconds()));
+      }));
+      const ViewFile file =
+          load_view_file(name, options_.render, globals_, detail_config(options_.render.lod, false), progress, display);
+      loaded(file, start_camera(file, options_.render, globals_));
     } catch (const std::exception& error) {
+      if (closing_) return;
       frames_.set_message(std::string(error.what()) + "; the picture shows what was there before");
     }
   }
@@ -134,7 +144,8 @@ private:
   const GlobalOptions& globals_;
   ViewOutputs& outputs_;
   std::vector<std::string> names_; ///< of the watching thread, after the constructor
-  FileWatch watch_;                ///< last: its thread uses the others
+  std::atomic<bool> closing_{false};
+  FileWatch watch_; ///< last: its thread uses the others
 };
 
 std::string isa_words() {
@@ -156,17 +167,20 @@ void restore_settings(const std::string& file, ViewSession& session) {
   apply_settings_toml({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, file, session);
 }
 
-void show_in_window(std::unique_ptr<ViewSession> session, const ViewOptions& options, const GlobalOptions& globals,
-                    ViewOutputs& outputs) {
-  ViewerWindow window(session->size(), isa_words());
-  FrameThread frames(std::move(session), command_text);
+void show_in_window(ImageSize size,
+                    const std::function<std::unique_ptr<ViewSession>(const Progress::Observer& observer)>& load,
+                    const ViewOptions& options, const GlobalOptions& globals, ViewOutputs& outputs) {
+  ViewerWindow window(size, isa_words(), options.files.front());
+  FrameThread frames({load, command_text, [&](const std::string& text) { outputs.report({{"message", text}}); }});
   WindowFiles files(frames, options, globals, outputs);
   WindowActions actions;
   actions.screenshot = [&](ViewSession& s, ViewControls&) { files.screenshot(s); };
   actions.record = [&](ViewSession& s, ViewControls& controls) { files.record(s, controls); };
   actions.profile = [&](ViewSession& s, ViewControls&) { files.profile(s); };
   actions.save_settings = [&](ViewSession& s, ViewControls&) { files.save_settings(s); };
-  actions.picked = [&](const Pick& pick) { outputs.report({{"pick", pick_json(pick)}}); };
+  actions.picked = [&](ViewSession& s, size_t pane, const Pick& pick) {
+    outputs.report({{"pick", pick_json(pick)}, {"pane", pane}, {"command", s.command(pane)}});
+  };
   actions.dropped = [&](const std::string& name) { files.open(name); };
   window.run(frames, actions);
 }

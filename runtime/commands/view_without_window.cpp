@@ -12,7 +12,8 @@ namespace {
 
 } // namespace
 
-void show_in_window(std::unique_ptr<ViewSession>, const ViewOptions& options, const GlobalOptions&, ViewOutputs&) {
+void show_in_window(ImageSize, const std::function<std::unique_ptr<ViewSession>(const Progress::Observer&)>&,
+                    const ViewOptions& options, const GlobalOptions&, ViewOutputs&) {
   fail_without_window(options.files.front());
 }
 

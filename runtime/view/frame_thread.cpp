@@ -32,9 +32,7 @@ std::vector<uint8_t> bytes_of(const Image& picture) {
 
 } // namespace
 
-FrameThread::FrameThread(std::unique_ptr<ViewSession> session,
-                         std::function<std::string(const std::vector<std::string>&)> command_text)
-    : session_(std::move(session)), controls_(*session_), command_text_(std::move(command_text)) {
+FrameThread::FrameThread(Host host) : host_(std::move(host)) {
   thread_ = std::thread([this] {
     try {
       run();
@@ -64,6 +62,15 @@ void FrameThread::post(Task task, Urgency urgency) {
   wake_.notify_all();
 }
 
+void FrameThread::post_reading(Task task) {
+  post([this, task = std::move(task)](ViewSession& session, ViewControls& controls) {
+    Progress progress([this](std::string_view, uint64_t, uint64_t) {
+      if (quit_) throw Error(ErrorKind::kCancelled, "the window was closed");
+    });
+    if (session.settle(progress)) task(session, controls);
+  });
+}
+
 void FrameThread::set_pick(std::optional<std::array<uint32_t, 2>> pixel) {
   {
     const std::lock_guard lock(mutex_);
@@ -75,12 +82,23 @@ void FrameThread::set_pick(std::optional<std::array<uint32_t, 2>> pixel) {
 }
 
 void FrameThread::set_message(const std::string& message) {
-  {
-    const std::lock_guard lock(mutex_);
-    message_ = message;
-    republish_ = true;
-  }
-  wake_.notify_all();
+  set_status(message);
+  host_.message(message);
+}
+
+void FrameThread::set_status(const std::string& status) {
+  const std::lock_guard lock(mutex_);
+  message_ = status;
+}
+
+std::string FrameThread::message() const {
+  const std::lock_guard lock(mutex_);
+  return message_;
+}
+
+std::pair<std::string, double> FrameThread::loading() const {
+  const std::lock_guard lock(mutex_);
+  return loading_;
 }
 
 std::shared_ptr<const ViewSnapshot> FrameThread::snapshot() const {
@@ -103,18 +121,28 @@ bool FrameThread::run_tasks() {
     tasks.swap(tasks_);
   }
   for (const Task& task : tasks) try {
-      task(*session_, controls_);
+      task(*session_, *controls_);
     } catch (const Error& error) {
       set_message(error.what());
     }
   return true;
 }
 
+void FrameThread::load() {
+  session_ = host_.load([this](std::string_view phase, uint64_t done, uint64_t total) {
+    if (quit_) throw Error(ErrorKind::kCancelled, "the window was closed");
+    const std::lock_guard lock(mutex_);
+    loading_ = {std::string(phase), total > 0 ? static_cast<double>(done) / static_cast<double>(total) : 0.0};
+  });
+  controls_ = std::make_unique<ViewControls>(*session_);
+}
+
 void FrameThread::run() {
+  load();
   double last_s = now_s();
   while (run_tasks()) {
     const double start_s = now_s();
-    controls_.advance(std::min(start_s - last_s, kMaxSeconds));
+    controls_->advance(std::min(start_s - last_s, kMaxSeconds));
     last_s = start_s;
     render();
     wait_for_work();
@@ -171,16 +199,15 @@ void FrameThread::publish(double step_ms) {
     shown->settings[pane] = view_settings(s.pane(pane).config);
   }
   shown->split = s.split(), shown->divider = s.divider(), shown->gain = s.gain();
-  shown->speed = controls_.speed(), shown->target_ms = s.target_ms();
-  shown->paused = controls_.paused(), shown->plays = controls_.plays(), shown->orbits = controls_.orbits();
-  shown->recording = controls_.recording();
-  shown->command = command_text_(s.command(0));
+  shown->speed = controls_->speed(), shown->target_ms = s.target_ms();
+  shown->paused = controls_->paused(), shown->plays = controls_->plays(), shown->orbits = controls_->orbits();
+  shown->recording = controls_->recording();
+  shown->command = host_.command_text(s.command(0));
   if (s.split() == SplitMode::kDifference && !s.last().moving && s.size().pixels() <= kLiveMetrics)
     shown->metrics = s.metrics();
   const std::lock_guard lock(mutex_);
   if (pick_ && (*pick_)[0] < s.size().width && (*pick_)[1] < s.size().height)
     shown->pick = s.pick(s.pane_at((*pick_)[0]), (*pick_)[0], (*pick_)[1]);
-  shown->message = message_;
   shown->number = ++published_;
   shown->frame_ms = step_ms + 1e3 * watch.seconds();
   session_->add_frame_time(shown->frame_ms);
@@ -193,7 +220,7 @@ void FrameThread::publish(double step_ms) {
 /// Waits while there is nothing to do: the picture is as good as it gets, and nobody asks for anything.
 void FrameThread::wait_for_work() {
   std::unique_lock lock(mutex_);
-  const bool finished = session_->last().still_frames >= kMaxStillFrames && !session_->changed() && !controls_.busy();
+  const bool finished = session_->last().still_frames >= kMaxStillFrames && !session_->changed() && !controls_->busy();
   if (blocked_) {
     wake_.wait(lock, [this] { return quit_ || !tasks_.empty(); });
     return;

@@ -8,8 +8,10 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "pbrt_import/base/progress.h"
 #include "runtime/view/view_controls.h"
 #include "runtime/view/view_session.h"
 #include "runtime/view/view_settings.h"
@@ -33,18 +35,26 @@ struct ViewSnapshot {
   std::optional<Pick> pick; ///< of the last set_pick()
   std::optional<DifferenceMetrics> metrics;
   std::string command; ///< of the first pane; empty while something moves
-  std::string message; ///< the last one: what was saved, or why something failed
 };
 
-/// Renders the frames of a session in a thread of its own, so that a window can answer meanwhile. Everything that
-/// changes the session runs in this thread between frames.
+/// Makes a session and renders its frames in a thread of its own, so that a window can answer meanwhile. Everything
+/// that changes the session runs in this thread between frames.
 class FrameThread {
 public:
   using Task = std::function<void(ViewSession& session, ViewControls& controls)>;
 
-  /// @param command_text writes words as a command line
-  FrameThread(std::unique_ptr<ViewSession> session,
-              std::function<std::string(const std::vector<std::string>&)> command_text);
+  /// What the thread needs of the program.
+  struct Host {
+    /// Makes the session. Its progress is to be reported to the observer, which ends it with Error(kCancelled) when the
+    /// FrameThread is destroyed.
+    std::function<std::unique_ptr<ViewSession>(const Progress::Observer& observer)> load;
+    /// Writes words as a command line.
+    std::function<std::string(const std::vector<std::string>&)> command_text;
+    /// Gets each set_message(). Called from any thread.
+    std::function<void(const std::string&)> message;
+  };
+
+  explicit FrameThread(Host host);
   /// Ends the frame within a tile, and the thread.
   ~FrameThread();
   FrameThread(const FrameThread&) = delete;
@@ -59,10 +69,18 @@ public:
 
   /// Runs a task before the next frame. What it throws as Error becomes the message.
   void post(Task task, Urgency urgency = Urgency::kAfterFrame);
+  /// Runs a task that reads the picture: before, a frame is rendered if the picture does not show all that was posted.
+  void post_reading(Task task);
   /// The pixel whose pick() the snapshots have; none: no pick.
   void set_pick(std::optional<std::array<uint32_t, 2>> pixel);
-  /// Shows a message. May be called from any thread.
+  /// Shows a message: what was saved, or why something failed. May be called from any thread.
   void set_message(const std::string& message);
+  /// Shows how far something is, until the next message. May be called from any thread.
+  void set_status(const std::string& status);
+  /// The last message or status.
+  std::string message() const;
+  /// How far the making of the session is: its phase, and the finished part in [0, 1], 0 if that is unknown.
+  std::pair<std::string, double> loading() const;
 
   /// The last frame that was published; null before the first.
   std::shared_ptr<const ViewSnapshot> snapshot() const;
@@ -71,6 +89,7 @@ public:
 
 private:
   void run();
+  void load();
   bool run_tasks();
   void render();
   void render_frame();
@@ -78,20 +97,22 @@ private:
   void publish(double step_ms);
   void wait_for_work();
 
-  std::unique_ptr<ViewSession> session_;
-  ViewControls controls_;
-  std::function<std::string(const std::vector<std::string>&)> command_text_;
-  mutable std::mutex mutex_; ///< of what follows, up to failure_
+  Host host_;
+  std::unique_ptr<ViewSession> session_;   ///< of the thread; null until it is loaded
+  std::unique_ptr<ViewControls> controls_; ///< the same
+  mutable std::mutex mutex_;               ///< of what follows, up to failure_
   std::condition_variable wake_;
   std::vector<Task> tasks_;
   std::optional<std::array<uint32_t, 2>> pick_;
   std::string message_;
-  bool republish_ = false; ///< pick or message changed
+  std::pair<std::string, double> loading_{"loading", 0.0};
+  bool republish_ = false; ///< the pick changed
   std::shared_ptr<const ViewSnapshot> snapshot_;
   std::exception_ptr failure_;
+  std::atomic<bool> quit_{false};     ///< end the thread
   std::atomic<bool> stop_{false};     ///< end the frame
   std::atomic<bool> refining_{false}; ///< the frame refines a still picture
-  bool quit_ = false, blocked_ = false;
+  bool blocked_ = false;
   bool moved_ = false; ///< the frame that was published last was moving
   double last_shown_s_ = 0.0;
   uint64_t published_ = 0;

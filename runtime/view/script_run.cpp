@@ -180,6 +180,7 @@ bool ScriptRun::run_camera() {
     set_camera();
   } else if (is("pivot")) {
     const auto [x, y] = pixel();
+    if (!session_.settle(progress_)) throw Error(ErrorKind::kCancelled, "cancelled");
     if (!session_.set_pivot(x, y)) fail("this pixel shows nothing");
   } else if (is("time")) {
     session_.set_time(value_->is_null() ? std::nullopt : std::optional(number(*value_)));
@@ -286,6 +287,7 @@ void ScriptRun::report_state() {
 }
 
 void ScriptRun::run_output() {
+  if (!is("report") && !session_.settle(progress_)) throw Error(ErrorKind::kCancelled, "cancelled");
   if (is("screenshot")) {
     screenshot();
   } else if (is("screen")) {

@@ -65,6 +65,22 @@ void ViewCamera::reset() {
   camera_ = base_;
 }
 
+void ViewCamera::change_scene(const ViewCamera& other) {
+  const CameraKey key = current_key();
+  const DVec3 pivot = pivot_ + origin_;
+  const bool same =
+      !key_ && !other.key_ && origin_ == other.origin_ && camera_key_text(key) == camera_key_text(other.current_key());
+  *this = other;
+  pivot_ = pivot - origin_;
+  if (!same) set(key);
+}
+
+Camera ViewCamera::in_scene(DVec3 origin, const Camera& base) const {
+  CameraKey key = current_key();
+  key.position -= origin, key.look -= origin;
+  return camera_of_key(key, base);
+}
+
 void ViewCamera::place(DVec3 position, DVec3 forward, DVec3 up) {
   CameraKey key = current_key();
   key.position = position + origin_;

@@ -29,6 +29,12 @@ public:
   void set(const CameraKey& key);
   /// Goes back to the base.
   void reset();
+  /// Takes the base, origin and up of another scene; the camera and its pivot stay where they are in the world. It is
+  /// the new base only if nothing moved and both bases are the same.
+  void change_scene(const ViewCamera& other);
+  /// This camera in another scene that is seen from the same place.
+  /// @param origin, base of the other scene, as for the constructor
+  Camera in_scene(DVec3 origin, const Camera& base) const;
 
   /// Moves by world units along the picture's axes: right, up, forward.
   void move(DVec3 steps);

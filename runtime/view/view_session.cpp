@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include <fmt/format.h>
 
@@ -46,12 +47,18 @@ ViewSession::ViewSession(std::vector<ViewFile> files, ViewCamera camera, const C
   if (!camera_.key()) camera_.set(camera_.current_key()); // the other files may have other cameras
 }
 
-void ViewSession::replace_file(size_t index, ViewFile file) {
+void ViewSession::add_file(ViewFile file) {
+  files_.push_back(std::move(file));
+  if (!camera_.key()) camera_.set(camera_.current_key());
+}
+
+void ViewSession::replace_file(size_t index, ViewFile file, const ViewCamera& start) {
   for (size_t pane = 0; pane < renderers_.size(); ++pane)
     if (panes_[pane].file == index) renderers_[pane].reset(); // they refer to the old file
   files_.at(index) = std::move(file);
   if (time_ && !files_[index].moves()) time_.reset();
-  restart_ = true;
+  if (index == 0) camera_.change_scene(start);
+  restart_ = changed_ = true;
 }
 
 void ViewSession::resize(ImageSize size) {
@@ -133,8 +140,17 @@ void ViewSession::set_time(std::optional<double> time_s) {
 bool ViewSession::set_pivot(uint32_t x, uint32_t y) {
   const Pick picked = pick(pane_at(x), x, y);
   if (!picked.surface) return false;
-  camera_.set_pivot(picked.surface->position - files_[panes_[0].file].at_rest.source->origin());
+  camera_.set_pivot(picked.surface->position - files_[0].at_rest.source->origin());
   return true;
+}
+
+/// The camera in a file's scene, which `render --camera lookat:...` gives for it.
+Camera ViewSession::camera_in(size_t file) const {
+  if (file == 0) return camera_.camera();
+  const ViewFile& shown = files_[file];
+  const std::span<const Camera> cameras = shown.at_rest.source->cameras();
+  const size_t number = std::strtoul(shown.base_camera.c_str(), nullptr, 10);
+  return camera_.in_scene(shown.at_rest.source->origin(), number < cameras.size() ? cameras[number] : camera_.camera());
 }
 
 void ViewSession::frame_scene() {
@@ -194,7 +210,7 @@ bool ViewSession::step(Progress& progress) {
       PaneRenderer& renderer = *renderers_[i];
       if (i > 0 && renderers_[i] == first) continue;
       if (!moving && restart_) renderer.restart();
-      renderer.next_frame(camera_.camera(), last_.time_s, progress);
+      renderer.next_frame(camera_in(panes_[i].file), last_.time_s, progress);
       add_report(renderer.report(), last_.report);
     }
   } catch (const Error& error) {

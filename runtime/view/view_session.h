@@ -59,8 +59,9 @@ public:
   // Error(kUsage) for what is not possible, and then change nothing.
   const std::vector<ViewFile>& files() const { return files_; }
   /// Replaces a file, for example by its new content; camera and settings stay.
-  void replace_file(size_t index, ViewFile file);
-  void add_file(ViewFile file) { files_.push_back(std::move(file)); }
+  /// @param start its own camera
+  void replace_file(size_t index, ViewFile file, const ViewCamera& start);
+  void add_file(ViewFile file);
   void resize(ImageSize size);
   ImageSize size() const { return size_; }
   void set_split(SplitMode mode);
@@ -104,6 +105,8 @@ public:
   /// Renders the next frame of all panes that are shown. Returns false if the observer of the progress ended it by
   /// Error(kCancelled); the still picture then begins again. Throws like FrameLoop::next_frame(), and MemoryError.
   bool step(Progress& progress);
+  /// Renders a frame if something has changed since the last one, so that the picture shows it. Returns like step().
+  bool settle(Progress& progress) { return moved_ || changed_ || last_.report.frames == 0 ? step(progress) : true; }
   const ViewFrame& last() const { return last_; }
   /// Whether the next frame begins anew: something moved or was changed since the last one.
   bool changed() const { return moved_ || restart_ || changed_; }
@@ -125,7 +128,7 @@ public:
   /// The pane at a column of the picture.
   size_t pane_at(uint32_t x) const;
   /// The words of the command whose picture of this layer has the same bytes as the pane's, without outputs; empty
-  /// while something moves.
+  /// while something moves. Needs settle() before.
   std::vector<std::string> command(size_t pane) const;
 
 private:
@@ -134,6 +137,7 @@ private:
   FrameConfig frame_config(const PaneState& pane, uint32_t quality) const;
   void require_layer(const PaneState& pane) const;
   void change_pane(size_t index, const PaneState& changed);
+  Camera camera_in(size_t file) const;
   void resolve();
 
   std::vector<ViewFile> files_;

@@ -160,8 +160,8 @@ void draw_pick(const Pick& pick, float bottom) {
 }
 
 /// The message, or the command that makes the picture. Returns the top of the line.
-float draw_message(const ViewSnapshot& shown) {
-  const std::string& text = shown.message.empty() ? shown.command : shown.message;
+float draw_message(const std::string& message, const std::string& command) {
+  const std::string& text = message.empty() ? command : message;
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   if (text.empty()) return screen.y - kMargin;
   ImGui::SetNextWindowPos({kMargin, screen.y - kMargin}, ImGuiCond_Always, {0.0f, 1.0f});
@@ -243,7 +243,7 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
     if (ImGui::SliderFloat("target, ms", &target, 0.0f, 200.0f, "%.0f", ImGuiSliderFlags_AlwaysClamp))
       frames.post([target](ViewSession& session, ViewControls&) { session.set_target_ms(double{target}); });
     tooltip("Milliseconds that a frame may take while something moves: above, its resolution falls. 0: no limit");
-    if (ImGui::Button("Screenshot (P)")) frames.post(actions.screenshot);
+    if (ImGui::Button("Screenshot (P)")) frames.post_reading(actions.screenshot);
     ImGui::SameLine();
     if (ImGui::Button("Save settings")) frames.post(actions.save_settings);
     ImGui::SameLine();
@@ -260,7 +260,7 @@ void Panels::draw(const ViewSnapshot& snapshot, FrameThread& frames, const Windo
   if (!shown) return;
   draw_views(snapshot, frames, actions);
   draw_times(snapshot);
-  const float bottom = draw_message(snapshot);
+  const float bottom = draw_message(frames.message(), snapshot.command);
   if (snapshot.pick) draw_pick(*snapshot.pick, bottom);
 }
 

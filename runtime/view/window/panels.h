@@ -13,6 +13,7 @@ namespace packtrace {
 class Panels {
 public:
   bool shown = true, help = false;
+  bool any() const { return shown || help; }
 
   /// Adds the times of a new frame.
   void add_frame(const ViewSnapshot& snapshot);

@@ -87,11 +87,25 @@ ImageSize framebuffer_size(GLFWwindow* window) {
   return {static_cast<uint32_t>(std::max(width, 1)), static_cast<uint32_t>(std::max(height, 1))};
 }
 
+/// What the window shows before the first frame.
+void draw_loading(const std::string& file, const std::pair<std::string, double>& loading) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x / 2.0f, screen.y / 2.0f}, ImGuiCond_Always, {0.5f, 0.5f});
+  if (ImGui::Begin("##loading", nullptr,
+                   ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
+                       ImGuiWindowFlags_AlwaysAutoResize)) {
+    ImGui::TextUnformatted(("loading " + file).c_str());
+    ImGui::ProgressBar(static_cast<float>(loading.second), {std::clamp(screen.x / 2.0f, 1.0f, 320.0f), 0.0f},
+                       loading.first.c_str());
+  }
+  ImGui::End();
+}
+
 } // namespace
 
 struct ViewerWindow::State {
   GLFWwindow* window = nullptr;
-  std::string device, title;
+  std::string device, title, file;
   PictureTexture texture;
   Panels panels;
   FrameThread* frames = nullptr;
@@ -119,7 +133,7 @@ struct ViewerWindow::State {
 void ViewerWindow::State::request(ViewRequest asked) {
   switch (asked) {
   case ViewRequest::kScreenshot:
-    frames->post(actions->screenshot);
+    frames->post_reading(actions->screenshot);
     break;
   case ViewRequest::kRecord:
     frames->post(actions->record);
@@ -175,11 +189,13 @@ void ViewerWindow::State::click() {
   const double now = glfwGetTime();
   const bool twice = now - clicked_s < kDoubleClickSeconds;
   clicked_s = twice ? -1.0 : now;
-  frames->post([at, twice, picked = actions->picked](ViewSession& session, ViewControls&) {
+  frames->post_reading([at, twice, picked = actions->picked](ViewSession& session, ViewControls&) {
     if (twice)
       session.set_pivot((*at)[0], (*at)[1]);
-    else
-      picked(session.pick(session.pane_at((*at)[0]), (*at)[0], (*at)[1]));
+    else {
+      const size_t pane = session.pane_at((*at)[0]);
+      picked(session, pane, session.pick(pane, (*at)[0], (*at)[1]));
+    }
   });
 }
 
@@ -191,7 +207,7 @@ void ViewerWindow::State::button(int code, int action) {
     if (clicked) click();
     return;
   }
-  if (ImGui::GetIO().WantCaptureMouse) return;
+  if (panels.any() && ImGui::GetIO().WantCaptureMouse) return;
   dragged = code == GLFW_MOUSE_BUTTON_LEFT    ? MouseButton::kLeft
             : code == GLFW_MOUSE_BUTTON_RIGHT ? MouseButton::kRight
                                               : MouseButton::kMiddle;
@@ -274,7 +290,7 @@ void ViewerWindow::State::draw() {
     frames->set_pick(panels.shown && !ImGui::GetIO().WantCaptureMouse && !dragged ? pixel() : std::nullopt);
     panels.draw(*shown, *frames, *actions);
   } else {
-    ImGui::GetBackgroundDrawList()->AddText({16, 16}, IM_COL32_WHITE, "rendering the first frame");
+    draw_loading(file, frames->loading());
   }
   ImGui::Render();
   const ImageSize pixels = framebuffer_size(window);
@@ -293,7 +309,8 @@ ViewerWindow::State& state_of(GLFWwindow* window) {
 
 } // namespace
 
-ViewerWindow::ViewerWindow(ImageSize size, std::string device) : state_(std::make_unique<State>()) {
+ViewerWindow::ViewerWindow(ImageSize size, std::string device, const std::string& file)
+    : state_(std::make_unique<State>()) {
   glfwSetErrorCallback([](int, const char* text) { last_glfw_error() = text; });
   if (glfwInit() != GLFW_TRUE) fail_to_open("there is no display to open a window on");
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
@@ -303,13 +320,14 @@ ViewerWindow::ViewerWindow(ImageSize size, std::string device) : state_(std::mak
   glfwWindowHintString(GLFW_X11_CLASS_NAME, "packtrace");
   GLFWwindow* const window =
       glfwCreateWindow(static_cast<int>(std::min(size.width, 16384u)), static_cast<int>(std::min(size.height, 16384u)),
-                       "packtrace", nullptr, nullptr);
+                       ("loading " + file + " - packtrace").c_str(), nullptr, nullptr);
   if (window == nullptr) {
     glfwTerminate();
     fail_to_open("no window with OpenGL 3.3 can be opened");
   }
   state_->window = window;
   state_->device = std::move(device);
+  state_->file = file;
   state_->size = size;
   glfwMakeContextCurrent(window);
   glfwSwapInterval(1);
@@ -319,7 +337,7 @@ ViewerWindow::ViewerWindow(ImageSize size, std::string device) : state_(std::mak
   glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int b, int action, int) { state_of(w).button(b, action); });
   glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { state_of(w).mouse(x, y); });
   glfwSetScrollCallback(window, [](GLFWwindow* w, double, double y) {
-    if (!ImGui::GetIO().WantCaptureMouse)
+    if (!state_of(w).panels.any() || !ImGui::GetIO().WantCaptureMouse)
       state_of(w).frames->post([y](ViewSession&, ViewControls& controls) { controls.wheel(y); });
   });
   glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {

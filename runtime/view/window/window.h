@@ -7,10 +7,11 @@
 
 namespace packtrace {
 
-/// What a window asks of the program. The first three run in the frame thread.
+/// What a window asks of the program. The tasks run in the frame thread.
 struct WindowActions {
   FrameThread::Task screenshot, record, profile, save_settings;
-  std::function<void(const Pick& pick)> picked;         ///< a click
+  /// A click. Runs in the frame thread, too.
+  std::function<void(ViewSession& session, size_t pane, const Pick& pick)> picked;
   std::function<void(const std::string& file)> dropped; ///< a file was dropped on the window
 };
 
@@ -19,7 +20,8 @@ class ViewerWindow {
 public:
   /// Opens the window. Throws Error(kUnsupported) without a display or OpenGL 3.3, saying what to do.
   /// @param device words for the title: the instruction set
-  ViewerWindow(ImageSize size, std::string device);
+  /// @param file the name to show until there is a frame
+  ViewerWindow(ImageSize size, std::string device, const std::string& file);
   ~ViewerWindow();
   ViewerWindow(const ViewerWindow&) = delete;
   ViewerWindow& operator=(const ViewerWindow&) = delete;

@@ -36,6 +36,24 @@ TEST(ViewCamera, StaysTheBaseUntilItMoves) {
   EXPECT_EQ(camera.camera().world_from_camera, start().world_from_camera);
 }
 
+TEST(ViewCamera, StaysInPlaceWhenItsSceneIsReplaced) {
+  ViewCamera camera(start(), DVec3(0), {0, 1, 0}, 5.0);
+  const ViewCamera same(start(), DVec3(0), {0, 1, 0}, 5.0);
+  camera.change_scene(same);
+  EXPECT_FALSE(camera.key()) << "it is still the base";
+  const CameraKey key = camera.current_key();
+  const DVec3 far(1e6, -2e6, 3e6);
+  const ViewCamera moved(test::camera_at({0, 2, -5}, {0, 1, 0}, 50.0), far, {0, 1, 0}, 5.0);
+  camera.change_scene(moved);
+  ASSERT_TRUE(camera.key());
+  EXPECT_EQ(camera_key_text(*camera.key()), camera_key_text(key));
+  const DVec3 position(camera.camera().world_from_camera[3]);
+  EXPECT_LT(glm::length(position + far - key.position), 1e-9);
+  EXPECT_LT(glm::length(camera.pivot() + far - DVec3(0, 1, 0)), 1e-9);
+  const Camera elsewhere = camera.in_scene(DVec3(0), start());
+  EXPECT_LT(glm::length(DVec3(elsewhere.world_from_camera[3]) - key.position), 1e-9);
+}
+
 TEST(ViewCamera, LookingRightMovesThePictureLeftAndLookingUpMovesItDown) {
   for (const Camera& base : {start(), mirrored(start())}) {
     const DVec3 target(0, 1, 0);

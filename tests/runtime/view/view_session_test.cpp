@@ -195,6 +195,24 @@ TEST(ViewSession, PicksAreTheValuesOfTheImage) {
   EXPECT_THROW(session.pick(0, 48, 0), Error);
 }
 
+TEST(ViewSession, SettlingRendersWhatChanged) {
+  const ViewBench bench;
+  ViewSession session = bench.session();
+  Progress progress;
+  EXPECT_TRUE(session.settle(progress));
+  EXPECT_EQ(session.last().still_frames, 1u);
+  EXPECT_TRUE(session.settle(progress));
+  EXPECT_EQ(session.last().still_frames, 1u) << "nothing changed";
+  session.move_camera([](ViewCamera& camera) { camera.move({0.5, 0, 0}); });
+  EXPECT_TRUE(session.settle(progress));
+  EXPECT_TRUE(session.last().moving);
+  EXPECT_TRUE(session.command(0).empty());
+  test::step(session, 3);
+  session.set_setting(0, "ao.radius", "0.5");
+  EXPECT_TRUE(session.settle(progress));
+  EXPECT_EQ(session.last().still_frames, 1u);
+}
+
 TEST(ViewSession, AnyWindowSizeWorks) {
   const ViewBench bench;
   ViewSession session = bench.session();
@@ -214,7 +232,7 @@ TEST(ViewSession, AReplacedFileIsShownFromTheSameCamera) {
   session.move_camera([](ViewCamera& camera) { camera.move({0.5, 0, 0}); });
   test::step(session, 4);
   const ViewBench other;
-  session.replace_file(0, other.file("new.pbrt"));
+  session.replace_file(0, other.file("new.pbrt"), ViewCamera(ViewBench::camera(), DVec3(0), DVec3(0, 1, 0), 6.0));
   test::step(session, 4);
   EXPECT_EQ(session.last().still_frames, 4u);
   expect_equal(session.image(0), still(other, of_render(other), session.camera().camera(), 4));
