@@ -78,7 +78,8 @@ SceneTotals generate_asteroids(const AsteroidsConfig& config, const OutputConfig
     do {
       for (int axis = 0; axis < 3; ++axis) place[axis] = random.uniform(-half, half);
     } while (glm::dot(place, place) < kClearAround * kClearAround);
-    const DAffine turned = compose(random_rock_rotation(random), scaling(DVec3(random.uniform(0.4, 1.3))));
+    const double size = random.uniform(0.4, 1.3);
+    const DAffine turned = compose(random_rock_rotation(random), scaling(DVec3(size)));
     writer.instance(name, compose(translation(place), turned));
   }
   return writer.finish();

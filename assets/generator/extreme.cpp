@@ -73,7 +73,8 @@ SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& ou
 
   for (int i = 0; i < 24; ++i) { // crumbs around the origin, where floats are finest
     const DVec3 at{random.uniform(-4e-6, 0.5e-6), 0.0, random.uniform(-1.5e-6, 4e-6)};
-    writer.instance("boulder", stand_at(at, random.uniform(0.0, 6.0), random.uniform(0.4e-6, 1.2e-6)));
+    const double size = random.uniform(0.4e-6, 1.2e-6), turn = random.uniform(0.0, 6.0);
+    writer.instance("boulder", stand_at(at, turn, size));
   }
   for (int i = 0; i < 5; ++i) {
     const DAffine lean = compose(translation({(1.2 + 0.55 * i) * 1e-6, 0.0, 0.4e-6 * i}),
@@ -86,8 +87,8 @@ SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& ou
   writer.instance("boulder", stand_at({7e5, 0.0, 1.4e6}, 2.0, 2e5));
   for (int i = 0; i < 24; ++i) { // outside the view, but inside the scene's bounds
     const DVec3 at{1e7 + random.uniform(-40.0, 40.0), random.uniform(0.0, 20.0), 1e7 + random.uniform(-40.0, 40.0)};
-    writer.instance(i % 2 == 0 ? "boulder" : "needles",
-                    stand_at(at, random.uniform(0.0, 6.0), random.uniform(1.0, 9.0)));
+    const double size = random.uniform(1.0, 9.0), turn = random.uniform(0.0, 6.0);
+    writer.instance(i % 2 == 0 ? "boulder" : "needles", stand_at(at, turn, size));
   }
   return writer.finish();
 }

@@ -69,8 +69,8 @@ GrassBlade BladeMaker::blade(uint32_t cell) const {
   const uint32_t n = config_.blades_per_side;
   const uint64_t patch = static_cast<uint64_t>(row_) * config_.tile_patches + static_cast<uint64_t>(column_);
   Random random(config_.seed, 1000 + patch * n * n + cell);
-  const glm::dvec2 in_patch((cell % n + 0.5 + random.uniform(-0.48, 0.48)) / n,
-                            (cell / n + 0.5 + random.uniform(-0.48, 0.48)) / n); // of the patch's size
+  const double across = random.uniform(-0.48, 0.48), along = random.uniform(-0.48, 0.48);
+  const glm::dvec2 in_patch((cell % n + 0.5 + along) / n, (cell / n + 0.5 + across) / n); // of the patch's size
   const glm::dvec2 in_tile = (glm::dvec2(column_, row_) + in_patch) / static_cast<double>(config_.tile_patches);
   const glm::dvec2 at_clump = in_tile * static_cast<double>(clumps_);
   const double clump = tiling_noise(at_clump, clumps_, config_.seed + 1), own = random.uniform(-1.0, 1.0);

@@ -276,8 +276,10 @@ void MeadowBuilder::build_trees() {
   constexpr double kBroadleaves[][3] = {{-13.0, 27.0, 1.35}, {-21.0, 34.0, 1.1}, {29.0, 58.0, 1.3}, {36.0, 66.0, 1.1},
                                         {-36.0, 78.0, 1.3},  {24.0, 116.0, 1.2}, {-5.0, 98.0, 1.0}, {52.0, 96.0, 1.4}};
   for (const auto& at : kBroadleaves) put("broadleaf", at[0], at[1], at[0] * 1.9, at[2], 0.15);
-  for (const auto& at : kBroadleaves)
-    put("bush", at[0] + random_.uniform(1.5, 3.0), at[1] - random_.uniform(1.0, 2.5), at[1], 1.5, 0.1);
+  for (const auto& at : kBroadleaves) {
+    const double nearer = random_.uniform(1.0, 2.5), aside = random_.uniform(1.5, 3.0);
+    put("bush", at[0] + aside, at[1] - nearer, at[1], 1.5, 0.1);
+  }
   for (int i = 0; i < 420; ++i) { // woods on the hills
     const double x = random_.uniform(-190.0, 240.0), z = random_.uniform(90.0, 300.0), turn = random_.uniform(0.0, 6.0);
     const double size = random_.uniform(0.8, 1.35), luck = random_.uniform(-0.15, 0.15);
@@ -305,7 +307,9 @@ void MeadowBuilder::build_movers() {
   writer_.moving_instance("sails", compose(axle, rotation_z(0.25)), compose(axle, rotation_z(0.25 + turn)));
   const double seconds = config_.frames / config_.frames_per_second;
   for (int i = 0; i < 9; ++i) {
-    const DVec3 at(random_.uniform(-12.0, 26.0), 15.5 + random_.uniform(-1.5, 4.5), random_.uniform(38.0, 58.0));
+    const double z = random_.uniform(38.0, 58.0), y = 15.5 + random_.uniform(-1.5, 4.5),
+                 x = random_.uniform(-12.0, 26.0);
+    const DVec3 at(x, y, z);
     const double heading = radians(70) + random_.uniform(-0.25, 0.25), size = random_.uniform(0.8, 1.1);
     const auto [s, c] = sin_cos(heading);
     const DVec3 end = at + DVec3(s, 0.06, c) * (4.5 * seconds);

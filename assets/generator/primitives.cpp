@@ -128,9 +128,12 @@ void add_blob(Mesh& mesh, const DAffine& frame, uint32_t cells, const std::funct
       glm::uvec3 du(0), dv(0), corner(0);
       du[(axis + 1) % 3] = 1, dv[(axis + 2) % 3] = 1;
       corner[(axis + 1) % 3] = i % cells, corner[(axis + 2) % 3] = i / cells;
-      add_quad(mesh, vertex(corner), vertex(corner + dv), vertex(corner + du + dv), vertex(corner + du));
+      const uint32_t right = vertex(corner + du), opposite = vertex(corner + du + dv), up = vertex(corner + dv);
+      add_quad(mesh, vertex(corner), up, opposite, right);
       corner[axis] = cells;
-      add_quad(mesh, vertex(corner), vertex(corner + du), vertex(corner + du + dv), vertex(corner + dv));
+      const uint32_t far_up = vertex(corner + dv), far_opposite = vertex(corner + du + dv),
+                     far_right = vertex(corner + du);
+      add_quad(mesh, vertex(corner), far_right, far_opposite, far_up);
     }
   }
 }

@@ -48,24 +48,25 @@ void TownBuilder::build_quay() {
   along_quay(9.0, 1.2, [&](double angle) { put_on("lamp_post", angle, 1.2, 0, angle); });
   along_quay(5.0, 0.55, [&](double angle) { put_on("bollard", angle, 0.55, 0, angle); });
   along_quay(17.0, 1.9,
-             [&](double angle) { put_on(any(objects_.palms), angle + 0.05, 1.9, 0, random_.uniform(0.0, 6.0), 0.95); });
+             [&](double angle) { put_any_on(objects_.palms, angle + 0.05, 1.9, 0, random_.uniform(0.0, 6.0), 0.95); });
   along_quay(6.3, 2.6, [&](double angle) {
     const double pick = random_.uniform();
     const double turn = angle + random_.uniform(-0.3, 0.3);
     if (pick < 0.3) {
-      put_on(any(objects_.tables), angle, 3.4, 0, turn);
+      put_any_on(objects_.tables, angle, 3.4, 0, turn);
     } else if (pick < 0.5) {
-      put_on(any(objects_.stalls), angle, 3.0, 0, turn);
+      put_any_on(objects_.stalls, angle, 3.0, 0, turn);
     } else if (pick < 0.72) { // unloaded goods
-      put_on(any(objects_.crates), angle, 1.8, 0, turn);
-      put_on(any(objects_.crates), angle + 0.026, 1.9, 0, turn + 0.4);
-      put(any(objects_.crates), terrain_.place(angle + 0.012, 1.85, 0) + DVec3(0, 0.8, 0), turn + 0.7);
+      put_any_on(objects_.crates, angle, 1.8, 0, turn);
+      put_any_on(objects_.crates, angle + 0.026, 1.9, 0, turn + 0.4);
+      put_any(objects_.crates, terrain_.place(angle + 0.012, 1.85, 0) + DVec3(0, 0.8, 0), turn + 0.7);
       put_on("barrel", angle - 0.03, 2.0, 0, turn);
       put_on("rope_coil", angle - 0.02, 1.1, 0, turn);
     } else if (pick < 0.86) {
-      put_on(any(objects_.palms), angle, 2.6, 0, random_.uniform(0.0, 6.0), random_.uniform(0.85, 1.15));
+      const double size = random_.uniform(0.85, 1.15);
+      put_any_on(objects_.palms, angle, 2.6, 0, random_.uniform(0.0, 6.0), size);
     } else if (pick < 0.93) {
-      put_on(any(objects_.racks), angle, 2.4, 0, turn);
+      put_any_on(objects_.racks, angle, 2.4, 0, turn);
     } else {
       put_on("bench", angle, 2.2, 0, angle);
     }
@@ -91,19 +92,19 @@ void TownBuilder::build_pier() {
       const DVec3 side = right * (random_.chance(0.5) ? 1.25 : -1.25);
       const double pick = random_.uniform();
       if (pick < 0.45) {
-        put(any(objects_.crates), at + side, turn + random_.uniform(-0.3, 0.3));
+        put_any(objects_.crates, at + side, turn + random_.uniform(-0.3, 0.3));
         put("barrel", at + side + way * 0.95, turn, 0.9);
-        if (random_.chance(0.6)) put(any(objects_.crates), at + side + DVec3(0, 0.8, 0), turn + 0.5, 0.8);
+        if (random_.chance(0.6)) put_any(objects_.crates, at + side + DVec3(0, 0.8, 0), turn + 0.5, 0.8);
       } else if (pick < 0.7) {
         put("barrel", at + side, turn);
         put("rope_coil", at + side * 0.8 - way * 0.9, turn);
       } else {
-        put(any(objects_.racks), at + side, turn + kPi / 2, 0.9);
+        put_any(objects_.racks, at + side, turn + kPi / 2, 0.9);
       }
     }
     if (i % 5 == 3) { // boats moored alongside, mostly on the harbour side
       const DVec3 berth = at + right * (random_.chance(0.75) ? 3.3 : -3.3);
-      put(any(objects_.rowing_boats), {berth.x, 0.0, berth.z}, turn + random_.uniform(-0.15, 0.15));
+      put_any(objects_.rowing_boats, {berth.x, 0.0, berth.z}, turn + random_.uniform(-0.15, 0.15));
     }
   }
 }
@@ -118,19 +119,19 @@ void TownBuilder::build_landmarks() {
   for (int i = 0; i < 26; ++i) {
     const auto [s, c] = sin_cos(i * 2.4);
     const double out = 1.7 * std::sqrt(static_cast<double>(i));
-    put(any(objects_.shore_rocks), islet + DVec3(s * out, 1.4 - 0.24 * out, c * out), i * 1.3,
-        random_.uniform(5.0, 8.0));
+    put_any(objects_.shore_rocks, islet + DVec3(s * out, 1.4 - 0.24 * out, c * out), i * 1.3,
+            random_.uniform(5.0, 8.0));
   }
   put("lighthouse", islet + DVec3(0, 3.6, 0), radians(10));
   static constexpr double kClouds[][4] = {{-215, 118, 400, 2.0}, {-150, 152, 430, 1.5}, {-250, 168, 440, 1.2},
                                           {15, 150, 420, 2.1},   {60, 132, 440, 1.5},   {215, 158, 430, 1.9},
                                           {-95, 128, 450, 1.3},  {150, 182, 440, 1.4}};
   for (const auto& cloud : kClouds) {
-    put(any(objects_.clouds), {cloud[0], cloud[1], cloud[2]}, random_.uniform(-0.4, 0.4), cloud[3]);
+    put_any(objects_.clouds, {cloud[0], cloud[1], cloud[2]}, random_.uniform(-0.4, 0.4), cloud[3]);
   }
   for (int i = 0; i < 18; ++i) {
     const DVec3 at{random_.uniform(-45.0, 35.0), random_.uniform(11.0, 26.0), random_.uniform(0.0, 45.0)};
-    put(any(objects_.gulls), at, random_.uniform(0.0, 6.0), 1.2);
+    put_any(objects_.gulls, at, random_.uniform(0.0, 6.0), 1.2);
   }
 }
 
@@ -142,13 +143,13 @@ void TownBuilder::build_boats() {
     const DVec3 at = terrain_.place(angle, out - (large ? 2.8 : 1.0), 0);
     const double turn = angle + kPi * (random_.chance(0.7) ? 1.0 : 0.0) + random_.uniform(-0.12, 0.12);
     if (terrain_.built(angle, 1.0) > 0.9)
-      put(any(large ? objects_.fishing_boats : objects_.rowing_boats), {at.x, 0.0, at.z}, turn);
+      put_any(large ? objects_.fishing_boats : objects_.rowing_boats, {at.x, 0.0, at.z}, turn);
     if (large) angle += 1.0 / terrain_.quay_radius(angle);
   }
   static constexpr double kMoored[][3] = {{3, -6, 0.9},  {13, 6, 2.2}, {-4, 14, 0.4},
                                           {22, -3, 1.4}, {8, 18, 2.9}, {-28, 26, 0.7}};
   for (const auto& boat : kMoored) {
-    put(any(objects_.rowing_boats), {boat[0], 0, boat[1]}, boat[2]);
+    put_any(objects_.rowing_boats, {boat[0], 0, boat[1]}, boat[2]);
     put("buoy", DVec3(boat[0] + 3.0, 0, boat[1] + 1.0), boat[2]);
   }
   put(objects_.fishing_boats[1], {-3.5, 0, -9.0}, radians(-28));
@@ -162,15 +163,15 @@ void TownBuilder::put_plant(DVec3 at, double wildness) {
   const double turn = random_.uniform(0.0, 2.0 * kPi), size = random_.uniform(0.7, 1.2);
   const double patch = fractal_noise(at * 0.045, config_.seed + 60, 2);
   if (wildness > 0.75)
-    put(any(objects_.rocks), at, turn, size * 1.8);
+    put_any(objects_.rocks, at, turn, size * 1.8);
   else if (patch > 0.28)
-    put(any(objects_.pines), at, turn, size);
+    put_any(objects_.pines, at, turn, size);
   else if (patch > 0.05)
-    put(any(objects_.broadleaves), at, turn, size);
+    put_any(objects_.broadleaves, at, turn, size);
   else if (patch > -0.22)
-    put(any(objects_.olives), at, turn, size);
+    put_any(objects_.olives, at, turn, size);
   else
-    put(any(objects_.cypresses), at, turn, size);
+    put_any(objects_.cypresses, at, turn, size);
 }
 
 /// Places trees on a coarse jittered grid, then undergrowth until the total number of instances is reached.
@@ -190,7 +191,7 @@ void TownBuilder::build_hillside() {
       const bool shore = at.y < 3.5;
       const double density = 0.5 + 0.45 * fractal_noise(at * 0.05, config_.seed + 61, 3);
       if (shore)
-        put(any(objects_.shore_rocks), at, wildness * 6.0, random_.uniform(1.5, 3.5));
+        put_any(objects_.shore_rocks, at, wildness * 6.0, random_.uniform(1.5, 3.5));
       else if (wildness < density)
         put_plant(at - DVec3(0, 0.15, 0), wildness);
     }
@@ -207,10 +208,10 @@ void TownBuilder::build_hillside() {
     }
     ++done;
     const double pick = random_.uniform(), turn = random_.uniform(0.0, 2.0 * kPi), size = random_.uniform(0.8, 1.7);
-    put(any(pick < 0.45  ? objects_.tufts
+    put_any(pick < 0.45  ? objects_.tufts
             : pick < 0.9 ? objects_.bushes
-                         : objects_.rocks),
-        at - DVec3(0, 0.05, 0), turn, size);
+                         : objects_.rocks,
+            at - DVec3(0, 0.05, 0), turn, size);
   }
 }
 

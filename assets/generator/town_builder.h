@@ -37,6 +37,15 @@ private:
   void put_on(std::string_view object, double angle, double inland, uint32_t level, double turn, double scale = 1.0) {
     put(object, terrain_.place(angle, inland, level), turn, scale);
   }
+  /// The same with one of several objects. It is drawn after the arguments were evaluated, so a call that draws one of
+  /// them has one order with every compiler.
+  void put_any(const std::vector<std::string>& objects, DVec3 at, double turn, double scale = 1.0) {
+    put(any(objects), at, turn, scale);
+  }
+  void put_any_on(const std::vector<std::string>& objects, double angle, double inland, uint32_t level, double turn,
+                  double scale = 1.0) {
+    put_on(any(objects), angle, inland, level, turn, scale);
+  }
   bool terraced(double angle, double inland) const { return terrain_.built(angle, inland) > 0.97; }
 
   /// Whether a flight of stairs from a level's street to the next level is within `margin` metres along the street.

@@ -64,12 +64,14 @@ void TownBuilder::decorate(const HouseStyle& style, const DAffine& frame) {
   for (const double side : {-1.0, 1.0}) {
     if (style.config.arcade || !random_.chance(0.55)) continue;
     const DVec3 corner{side * (half - 0.4), 0.0, -0.45};
-    if (random_.chance(0.65))
-      add(any(objects_.pots), corner, random_.uniform(0.0, 6.0), 1.0);
-    else if (random_.chance(0.5))
+    if (random_.chance(0.65)) {
+      const double turn = random_.uniform(0.0, 6.0);
+      add(any(objects_.pots), corner, turn, 1.0);
+    } else if (random_.chance(0.5)) {
       add("barrel", corner, 0.0, 0.85);
-    else
+    } else {
       add(any(objects_.blossoms), corner + DVec3(0, 0, 0.2), 0.0, 1.1);
+    }
   }
   if (style.config.floors > 1 && !style.config.balcony && random_.chance(0.22)) {
     add(any(objects_.laundry), {-half + 0.5, kFloorHeight * 2.0 - 0.35, -0.45}, 0.0, (style.config.width - 1.0) / 4.0);
@@ -82,12 +84,12 @@ void TownBuilder::build_garden(uint32_t level, double angle) {
                      : random_.chance(0.5) ? objects_.broadleaves
                                            : objects_.olives;
   const double size = random_.uniform(0.75, 1.0);
-  put_on(any(tree), angle, back - 2.4, level, random_.uniform(0.0, 6.0), size);
+  put_any_on(tree, angle, back - 2.4, level, random_.uniform(0.0, 6.0), size);
   for (int i = 0; i < 4; ++i) {
     const double inland = back - random_.uniform(0.8, 4.5);
     const double beside = angle + random_.uniform(-1.5, 1.5) / radius;
-    put_on(any(random_.chance(0.4) ? objects_.blossoms : objects_.bushes), beside, inland, level,
-           random_.uniform(0.0, 6.0));
+    const double turn = random_.uniform(0.0, 6.0);
+    put_any_on(random_.chance(0.4) ? objects_.blossoms : objects_.bushes, beside, inland, level, turn);
   }
 }
 
@@ -109,7 +111,7 @@ void TownBuilder::build_stairs(uint32_t level) {
     put("stairs", foot, angle);
     for (const double side : {-1.6, 1.6}) {
       if (random_.chance(0.7))
-        put(any(objects_.pots), foot + DVec3(c * side, 0.0, -s * side), random_.uniform(0.0, 6.0));
+        put_any(objects_.pots, foot + DVec3(c * side, 0.0, -s * side), random_.uniform(0.0, 6.0));
     }
   }
 }
@@ -132,21 +134,21 @@ void TownBuilder::build_edges() {
       const double turn = middle - slope;
       const DVec3 top(r * s, TownTerrain::level_height(level), r * c);
       if (level == 0) {
-        put(any(objects_.quay), top, turn);
+        put_any(objects_.quay, top, turn);
         continue;
       }
-      put(any(objects_.walls), top - DVec3(0, TownTerrain::kRiser, 0), turn);
+      put_any(objects_.walls, top - DVec3(0, TownTerrain::kRiser, 0), turn);
       if (near_stairs(level - 1, middle, 2.3) || level == TownTerrain::kLevels) continue;
       const DVec3 inside = top + DVec3(s, 0, c) * 0.12;
       const uint64_t run = hash_bits(config_.seed + level * 1000 + piece / 4) % 5;
       if (run < 2 && level < 6)
         put("railing", inside, turn);
       else if (run < 2)
-        put(any(objects_.fences), inside, turn);
+        put_any(objects_.fences, inside, turn);
       else if (run < 4)
-        put(any(objects_.parapets), inside, turn);
+        put_any(objects_.parapets, inside, turn);
       else
-        put(any(objects_.pots), inside + DVec3(s, 0, c) * 0.3, random_.uniform(0.0, 6.0), 1.1);
+        put_any(objects_.pots, inside + DVec3(s, 0, c) * 0.3, random_.uniform(0.0, 6.0), 1.1);
     }
   }
 }
