@@ -25,6 +25,7 @@ struct ImportOptions {
   double tessellation_tolerance = 1e-3;         ///< relative to the radius of the curved shape, within [1e-6, 0.5]
   bool allow_files_outside_scene_folder = true; ///< exporters write "../textures/x.png"
   bool keep_textures = false;                   ///< fill Scene::textures; otherwise materials have average colours only
+  bool keep_shading = false;                    ///< fill Material::shading, Scene::lights and Scene::environment_maps
   bool keep_unused_objects = false;             ///< otherwise objects without instances are left out, with a warning
   /// Number of the world (WorldBegin ... WorldEnd with its options) to read, from 1. Unset: the first, with a warning
   /// if there are more.
@@ -40,7 +41,7 @@ struct ImportStatistics {
   std::map<std::string, uint64_t> shapes; ///< Shape directives by kind, used or not
   uint64_t shapes_skipped = 0;            ///< shapes left out because of an error
   uint64_t shapes_absent = 0;             ///< shapes left out because their alpha is 0 everywhere
-  uint64_t light_sources = 0;             ///< LightSource directives; ambient occlusion does not use them
+  uint64_t light_sources = 0;             ///< LightSource directives; only shading uses them
   uint64_t area_lights = 0;               ///< emissive shapes
   uint64_t textures_found = 0;            ///< distinct image files that textures name
   uint64_t textures_missing = 0;

@@ -63,7 +63,8 @@ FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
     outcome.memory = MemoryReservation(options_.memory);
     const std::vector<std::byte> bytes = read_whole_file(image.path, kNoLimit, &content);
     outcome.bytes = bytes.size();
-    image.summary = read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, outcome.memory);
+    image.summary = read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours, image.want_radiance},
+                               outcome.memory);
   });
   outcome.memory.resize(bytes_of(image.summary), "its pixels");
   image.missing = !outcome.error.empty();

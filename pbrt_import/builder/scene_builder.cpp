@@ -34,7 +34,9 @@ constexpr auto kSections = [] {
 SceneBuilder::SceneBuilder(const ImportOptions& options, FileNames& file_names, Reporter& reporter, Progress& progress)
     : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter),
       check_cancelled_([&progress] { progress.check_cancelled(); }), mesh_memory_(options.memory),
-      kept_memory_(options.memory), mesh_queue_(options.tessellation_tolerance, check_cancelled_) {}
+      kept_memory_(options.memory), mesh_queue_(options.tessellation_tolerance, check_cancelled_) {
+  if (options.keep_shading) materials_.keep_shading();
+}
 
 bool SceneBuilder::allowed_here(const Directive& directive) {
   const Section section = kSections[static_cast<size_t>(directive.kind)];
@@ -180,10 +182,7 @@ void SceneBuilder::execute_directive(Directive& directive) {
   case K::kAreaLightSource:
     return handle_area_light(directive);
   case K::kLightSource:
-    record_unread_files(directive);
-    ++statistics_.light_sources;
-    ++statistics_.ignored["light_sources"];
-    return;
+    return handle_light(directive);
   case K::kReverseOrientation:
     state_.attributes.reverse_orientation = !state_.attributes.reverse_orientation;
     return;
@@ -328,6 +327,16 @@ void SceneBuilder::handle_texture(const Directive& directive) {
   (directive.names[1] == "float" ? state_.float_textures : state_.spectrum_textures).define(directive.names[0], *node);
 }
 
+void SceneBuilder::handle_light(const Directive& directive) {
+  record_unread_files(directive);
+  ++statistics_.light_sources;
+  if (!options_.keep_shading) {
+    ++statistics_.ignored["light_sources"];
+    return;
+  }
+  lights_.add(directive, context(directive.place), place(directive, "light").map);
+}
+
 void SceneBuilder::handle_area_light(const Directive& directive) {
   const std::string& kind = directive.names[0];
   constexpr std::string_view kAreaLights[] = {"diffuse", "area"};
@@ -336,12 +345,12 @@ void SceneBuilder::handle_area_light(const Directive& directive) {
                                                 did_you_mean(closest_name(kind, kAreaLights)));
   const TextureContext here = context(directive.place);
   const TextureParameters parameters(here, directive.parameters);
-  const Vec3 radiance =
-      parameters.constant_spectrum("L", Vec3(1.0f)) * parameters.constant_spectrum("scale", Vec3(1.0f));
+  const Vec3 radiance = light_brightness(parameters, "L").value_or(Vec3(0.0f));
   constexpr std::string_view kSampling[] = {"samples", "nsamples"};
   parameters.mark_used(kSampling);
   const bool both_sides = directive.parameters.get_bool("twosided", false);
   state_.attributes.area_light = radiance == Vec3(0.0f) ? kNone : both_sides ? 1 : 0;
+  state_.attributes.emission = options_.keep_shading && radiance != Vec3(0.0f) ? materials_.emission(radiance) : kNone;
   report_unused(directive.parameters, reporter_);
 }
 

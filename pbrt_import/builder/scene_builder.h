@@ -13,6 +13,7 @@
 #include "pbrt_import/language/cameras.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/graphics_state.h"
+#include "pbrt_import/language/lights.h"
 #include "pbrt_import/language/materials.h"
 #include "pbrt_import/language/parser.h"
 #include "pbrt_import/language/texture_graph.h"
@@ -60,6 +61,7 @@ private:
   void handle_medium(const Directive& directive);
   void handle_texture(const Directive& directive);
   void handle_area_light(const Directive& directive);
+  void handle_light(const Directive& directive);
   void begin_world(const Directive& directive);
   void end_world(const Place& place);
   void open(BlockKind kind, const Directive& directive);
@@ -101,6 +103,7 @@ private:
   std::vector<TransformPair> coordinate_systems_; ///< indexed by number in coordinate_system_names_
   TextureGraph graph_;
   MaterialLibrary materials_{graph_};
+  LightCollector lights_;
   FileLoader loader_;
   Scene scene_; ///< until finish(), Shape::material is the number of a MaterialLibrary use
   ImportStatistics statistics_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "pbrt_import/builder/outer_sides.h"
 #include "pbrt_import/builder/scene_pruning.h"
 #include "pbrt_import/builder/shape_builder.h"
 #include "pbrt_import/language/transforms.h"
@@ -47,6 +48,7 @@ void SceneBuilder::add_shape(Directive& directive) {
                                            " do not emit, as in pbrt");
   } else {
     use.area_light = state_.attributes.area_light;
+    use.emission = state_.attributes.emission;
     statistics_.area_lights += use.area_light != kNone;
   }
   shape.material = materials_.use(use);
@@ -251,6 +253,11 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)
     reporter_.note(end, absent == 1 ? "1 shape is left out: its alpha is 0 everywhere"
                                     : std::to_string(absent) + " shapes are left out: their alpha is 0 everywhere");
+  if (options_.keep_shading) {
+    scene_.has_shading = true;
+    lights_.finish(graph_, scene_);
+    find_outer_sides(scene_);
+  }
   scene_.cameras = cameras_.finish();
   statistics_.cameras_left_out = cameras_.left_out();
   drop_unused_objects(scene_, instance_residuals_, options_.keep_unused_objects, [](uint32_t) {});

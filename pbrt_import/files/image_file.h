@@ -20,12 +20,16 @@ struct ImageSummary {
   std::vector<std::string> problems; ///< damage that did not prevent reading
   std::vector<uint8_t> rgb;          ///< layout of AlbedoTexture, clamped to [0, 1]; empty if not wanted or too large
   std::vector<uint32_t> nonzero;     ///< layout of AlphaMask; a bit is set if any channel is not 0
+  uint32_t map_width = 0;            ///< of `radiance`: that of the image, at most kMaxMapWidth
+  uint32_t map_height = 0;
+  std::vector<Vec3> radiance; ///< linear RGB, row 0 on top, averaged to the map's size; empty if not wanted
 };
 
 /// Selects optional data of an image, besides its size and average.
 struct ImageWants {
-  bool mask = false;    ///< fill ImageSummary::nonzero
-  bool colours = false; ///< fill ImageSummary::rgb
+  bool mask = false;     ///< fill ImageSummary::nonzero
+  bool colours = false;  ///< fill ImageSummary::rgb
+  bool radiance = false; ///< fill ImageSummary::radiance
 };
 
 /// Only the average is kept of images with more texels.
@@ -42,12 +46,12 @@ ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, Imag
                         MemoryReservation& memory);
 inline ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
   MemoryReservation memory{MemoryBudget(max_bytes)};
-  return read_image(bytes, decode_srgb, ImageWants{want_mask, false}, memory);
+  return read_image(bytes, decode_srgb, ImageWants{want_mask, false, false}, memory);
 }
 
 /// Memory of a summary's arrays in bytes.
 inline uint64_t bytes_of(const ImageSummary& summary) {
-  return summary.rgb.size() + summary.nonzero.size() * sizeof(uint32_t);
+  return summary.rgb.size() + summary.nonzero.size() * sizeof(uint32_t) + summary.radiance.size() * sizeof(Vec3);
 }
 
 } // namespace packtrace

@@ -35,6 +35,7 @@ public:
       pixel = glm::max(pixel, Vec3(0.0f));
     }
     row_ += DVec3(pixel);
+    if (want_radiance_) map_at(x, y) += pixel;
     if (want_colours_)
       for (size_t c = 0; c < 3; ++c)
         summary_.rgb[(static_cast<size_t>(y) * width_ + x) * 3 + c] = srgb8_of_linear(pixel[static_cast<int>(c)]);
@@ -53,6 +54,11 @@ public:
       for (double& sum : sums) sum += double{linear[*sample++]};
     row_ += DVec3(sums[0], sums[kChannels / 2], sums[kChannels - 1]);
     if (want_mask_) set_mask_row<kChannels>(y, pixels, linear);
+    if (want_radiance_)
+      for (uint32_t x = 0; x < width_; ++x) {
+        const uint8_t* const p = pixels + size_t{x} * kChannels;
+        map_at(x, y) += Vec3(linear[p[0]], linear[p[kChannels / 2]], linear[p[kChannels - 1]]);
+      }
     if (want_colours_) {
       uint8_t* to = summary_.rgb.data() + static_cast<size_t>(y) * width_ * 3;
       for (uint32_t x = 0; x < width_; ++x)
@@ -72,6 +78,14 @@ public:
   ImageSummary finish();
 
 private:
+  /// The sum of the map's pixel that holds a pixel of the image.
+  Vec3& map_at(uint32_t x, uint32_t y) {
+    const uint64_t column = uint64_t{x} * summary_.map_width / summary_.width,
+                   row = uint64_t{y} * summary_.map_height / summary_.height;
+    return summary_.radiance[static_cast<size_t>(row * summary_.map_width + column)];
+  }
+  void average_map();
+
   template <uint32_t kChannels>
   void set_mask_row(uint32_t y, const uint8_t* pixels, const std::array<float, 256>& linear) {
     const uint32_t words = AlphaMask::row_words(width_);
@@ -91,7 +105,7 @@ private:
   ImageSummary summary_;
   uint64_t not_finite_pixels_ = 0, negative_pixels_ = 0;
   uint32_t width_;
-  bool want_mask_, want_colours_;
+  bool want_mask_, want_colours_, want_radiance_;
   DVec3 row_{0.0}, total_{0.0};
 };
 

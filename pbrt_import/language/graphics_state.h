@@ -48,6 +48,7 @@ struct TransformPair {
 struct Attributes {
   uint32_t material = kNone;   ///< number in MaterialLibrary; kNone: pbrt's default, grey matte
   uint32_t area_light = kNone; ///< 1: emits from both sides, 0: from the front; kNone: no light
+  uint32_t emission = kNone;   ///< radiance in MaterialLibrary; kNone: no light, or shading is not kept
   bool reverse_orientation = false;
 };
 

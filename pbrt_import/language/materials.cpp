@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "pbrt_import/language/material_parameters.h"
 #include "pbrt_import/language/spectrum.h"
 #include "pbrt_import/text/tokenizer.h"
 
@@ -13,77 +14,6 @@ namespace packtrace {
 namespace {
 
 using Node = TextureGraph::Node;
-
-/// All parameter names that pbrt-v3 looks up for a kind of material.
-std::span<const std::string_view> parameter_names(std::string_view kind) {
-  static constexpr std::string_view kMatte[] = {"Kd", "sigma", "bumpmap"};
-  static constexpr std::string_view kPlastic[] = {"Kd", "Ks", "roughness", "remaproughness", "bumpmap"};
-  static constexpr std::string_view kUber[] = {"Kd",         "Ks",  "Kr",    "Kt",      "roughness",      "uroughness",
-                                               "vroughness", "eta", "index", "opacity", "remaproughness", "bumpmap"};
-  static constexpr std::string_view kTranslucent[] = {
-      "Kd", "Ks", "reflect", "transmit", "roughness", "remaproughness", "bumpmap"};
-  static constexpr std::string_view kSubstrate[] = {"Kd",     "Ks", "uroughness", "vroughness", "remaproughness",
-                                                    "bumpmap"};
-  static constexpr std::string_view kMirror[] = {"Kr", "bumpmap"};
-  static constexpr std::string_view kGlass[] = {
-      "Kr", "Kt", "eta", "index", "uroughness", "vroughness", "remaproughness", "bumpmap"};
-  static constexpr std::string_view kMetal[] = {
-      "eta", "k", "roughness", "uroughness", "vroughness", "remaproughness", "bumpmap"};
-  static constexpr std::string_view kDisney[] = {"color",        "metallic",       "eta",       "roughness",
-                                                 "speculartint", "anisotropic",    "sheen",     "sheentint",
-                                                 "clearcoat",    "clearcoatgloss", "spectrans", "scatterdistance",
-                                                 "thin",         "flatness",       "difftrans", "bumpmap"};
-  static constexpr std::string_view kHair[] = {"sigma_a", "color",  "eumelanin", "pheomelanin",
-                                               "eta",     "beta_m", "beta_n",    "alpha"};
-  static constexpr std::string_view kSubsurface[] = {
-      "name",       "sigma_a",    "sigma_s",        "Kr",     "Kt", "eta", "g", "scale", "roughness",
-      "uroughness", "vroughness", "remaproughness", "bumpmap"};
-  static constexpr std::string_view kKdSubsurface[] = {
-      "Kd",     "mfp", "Kr", "Kt", "eta", "g", "scale", "roughness", "uroughness", "vroughness", "remaproughness",
-      "bumpmap"};
-  static constexpr std::string_view kFourier[] = {"bsdffile", "bumpmap"};
-  static constexpr std::string_view kMix[] = {"amount", "namedmaterial1", "namedmaterial2"};
-  struct Entry {
-    std::string_view kind;
-    std::span<const std::string_view> names;
-  };
-  static constexpr Entry kEntries[] = {
-      {"matte", kMatte},
-      {"plastic", kPlastic},
-      {"uber", kUber},
-      {"translucent", kTranslucent},
-      {"substrate", kSubstrate},
-      {"mirror", kMirror},
-      {"glass", kGlass},
-      {"metal", kMetal},
-      {"disney", kDisney},
-      {"hair", kHair},
-      {"subsurface", kSubsurface},
-      {"kdsubsurface", kKdSubsurface},
-      {"fourier", kFourier},
-      {"mix", kMix},
-      {"none", {}},
-      {"", {}},
-  };
-  for (const Entry& entry : kEntries)
-    if (entry.kind == kind) return entry.names;
-  return {};
-}
-
-/// The type that pbrt-v3 expects of a material parameter.
-TextureParameters::Kind parameter_kind(std::string_view material, std::string_view name) {
-  using Kind = TextureParameters::Kind;
-  constexpr std::string_view kSpectra[] = {
-      "Kd",      "Ks",      "Kr",  "Kt", "opacity", "reflect", "transmit", "color", "scatterdistance",
-      "sigma_a", "sigma_s", "mfp", "k",  "amount"};
-  constexpr std::string_view kStrings[] = {"name", "namedmaterial1", "namedmaterial2", "bsdffile"};
-  constexpr std::string_view kBools[] = {"remaproughness", "thin"};
-  const auto is_in = [&](const auto& names) {
-    return std::find(std::begin(names), std::end(names), name) != std::end(names);
-  };
-  if (is_in(kSpectra) || (name == "eta" && material == "metal")) return Kind::kSpectrum;
-  return is_in(kStrings) ? Kind::kString : is_in(kBools) ? Kind::kBool : Kind::kFloat;
-}
 
 constexpr std::string_view kKinds[] = {"matte", "plastic", "uber", "translucent", "substrate",    "mirror",  "glass",
                                        "metal", "disney",  "hair", "subsurface",  "kdsubsurface", "fourier", "mix",
@@ -96,7 +26,7 @@ bool is_at_least(const TextureParameters& parameters, std::string_view name, flo
   return value && value->x >= bound;
 }
 
-Node metal_albedo(const TextureParameters& parameters) {
+MetalIndices metal_indices(const TextureParameters& parameters) {
   MetalIndices indices = *metal_by_name("Cu"); // pbrt's default
   for (const std::string_view name : {"eta", "k"}) {
     const auto by_name = metal_by_name(parameters.spectrum_file(name));
@@ -110,10 +40,13 @@ Node metal_albedo(const TextureParameters& parameters) {
                                                                            "\" is not supported; copper's is used");
     }
   }
+  return {glm::max(indices.eta, Vec3(0.0f)), glm::max(indices.k, Vec3(0.0f))};
+}
+
+Vec3 metal_albedo(const MetalIndices& indices) {
   Vec3 albedo;
-  for (int c = 0; c < 3; ++c)
-    albedo[c] = conductor_albedo(std::max(indices.eta[c], 0.0f), std::max(indices.k[c], 0.0f));
-  return parameters.context().graph.constant(albedo);
+  for (int c = 0; c < 3; ++c) albedo[c] = conductor_albedo(indices.eta[c], indices.k[c]);
+  return albedo;
 }
 
 /// Sets the albedo and the flags of a material that is not a mix. The albedo is the diffuse colour or an approximation.
@@ -140,7 +73,8 @@ void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TexturePar
     else
       recipe.flags |= kTransmissive;
   } else if (kind == "metal") {
-    recipe.albedo = metal_albedo(parameters);
+    recipe.metal = metal_indices(parameters);
+    recipe.albedo = graph.constant(metal_albedo(recipe.metal));
     recipe.flags |= kMetal;
   } else if (kind == "disney") {
     recipe.albedo = spectrum("color", 0.5f);
@@ -165,7 +99,7 @@ Vec3 clamped(Vec3 v) { return glm::clamp(v, Vec3(0.0f), Vec3(1.0f)); }
 } // namespace
 
 MaterialLibrary::MaterialLibrary(TextureGraph& graph) : graph_(graph) {
-  definitions_.push_back({"matte", {}, {"default", 0, graph.constant(Vec3(0.5f))}, {}});
+  definitions_.push_back({"matte", {}, {"default", 0, graph.constant(Vec3(0.5f)), matte_shading(graph), {}}, {}});
 }
 
 uint32_t MaterialLibrary::define(const Directive& directive, const TextureContext& context) {
@@ -187,14 +121,20 @@ uint32_t MaterialLibrary::define(const Directive& directive, const TextureContex
                                                 did_you_mean(closest_name(kind, kKinds)));
     kind = "matte";
   }
-  const uint32_t number = add(kind, named ? directive.names[0] : kind.empty() ? "none" : kind, parameters);
+  std::vector<std::string> reduced;
+  const uint32_t number = add(kind, named ? directive.names[0] : kind.empty() ? "none" : kind, parameters, reduced);
+  for (const std::string& what : reduced)
+    context.reporter.note(directive.place,
+                          "material " + in_quotes(definitions_[number].recipe.name) + " is simplified: " + what);
   definitions_[number].parameters = std::make_shared<const ParameterList>(directive.parameters);
   report_unused(directive.parameters, context.reporter);
   return number;
 }
 
-uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureParameters& parameters) {
-  MaterialRecipe recipe{std::move(name), 0, 0};
+uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureParameters& parameters,
+                              std::vector<std::string>& reduced) {
+  MaterialRecipe recipe;
+  recipe.name = std::move(name);
   if (kind == "mix") {
     const auto part = [&](std::string_view parameter) -> const MaterialRecipe& {
       const std::string part_name = parameters.get_string(parameter, "");
@@ -216,8 +156,13 @@ uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureP
     if (const Vec3* const constant = graph_.constant_value(amount)) amount = graph_.constant(clamped(*constant));
     recipe.albedo = graph_.mix(b.albedo, a.albedo, amount);
     recipe.flags = (a.flags & b.flags) | ((a.flags | b.flags) & kNormalMap);
+    if (shading_) {
+      recipe.shading = mixed_shading(a.shading, b.shading, amount, graph_);
+      reduced.emplace_back("it is one surface with the mean colours of both, not a mix of two");
+    }
   } else {
     fill_recipe(recipe, kind, parameters);
+    if (shading_) recipe.shading = shading_recipe(kind, parameters, recipe.metal, reduced);
   }
   // Exporters for other renderers write "Normal"; pbrt knows "bumpmap" only.
   for (const std::string_view map : {"normalmap", "Normal"})
@@ -243,15 +188,16 @@ uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterLi
   // grows.
   const std::shared_ptr<const ParameterList> shared = definitions_[base].parameters;
   const ParameterList base_parameters = shared ? *shared : ParameterList();
-  const uint32_t number =
-      add(definitions_[base].kind, definitions_[base].recipe.name, TextureParameters(context, shape, &base_parameters));
+  std::vector<std::string> as_reduced_before;
+  const uint32_t number = add(definitions_[base].kind, definitions_[base].recipe.name,
+                              TextureParameters(context, shape, &base_parameters), as_reduced_before);
   definitions_[number].parameters = shared;
   return number;
 }
 
 uint32_t MaterialLibrary::use(const MaterialUse& use) {
-  const bool plain = use.alpha == kNone && use.shadow_alpha == kNone && use.area_light == kNone;
-  if (plain) { // most uses are plain
+  const bool plain = use.alpha == kNone && use.shadow_alpha == kNone && use.area_light == kNone; // no emission
+  if (plain) {                                                                                   // most uses are plain
     plain_uses_.resize(definitions_.size(), kNone);
     uint32_t& number = plain_uses_[use.recipe];
     if (number != kNone) return number;
@@ -267,9 +213,11 @@ uint32_t MaterialLibrary::use(const MaterialUse& use) {
 void MaterialLibrary::require_images(bool colours) {
   colours_ = colours;
   for (const MaterialUse& use : uses_) {
-    graph_.require(definitions_[use.recipe].recipe.albedo, {false, colours});
-    if (use.alpha != kNone) graph_.require(use.alpha, {true, false});
-    if (use.shadow_alpha != kNone) graph_.require(use.shadow_alpha, {true, false});
+    const MaterialRecipe& recipe = definitions_[use.recipe].recipe;
+    graph_.require(recipe.albedo, {false, colours, false});
+    if (shading_) for_each_node(recipe.shading, [&](Node node) { graph_.require(node, {}); });
+    if (use.alpha != kNone) graph_.require(use.alpha, {true, false, false});
+    if (use.shadow_alpha != kNone) graph_.require(use.shadow_alpha, {true, false, false});
   }
 }
 
@@ -329,6 +277,36 @@ uint32_t MaterialLibrary::add_texture(std::vector<AlbedoTexture>& textures, Albe
   return number;
 }
 
+SurfaceShading MaterialLibrary::shading_of(const Definition& definition, const MaterialUse& use, Reporter& reporter) {
+  std::vector<std::string> outside;
+  SurfaceShading shading = resolved(definition.recipe.shading, graph_, outside);
+  for (const std::string& what : outside)
+    reporter.warning(definition.place, "material " + in_quotes(definition.recipe.name) + ": its " + what +
+                                           " leaves its range; the nearest value is used");
+  if (use.emission != kNone) shading.emission = emissions_[use.emission];
+  return shading;
+}
+
+/// Number of equal properties, for keys.
+uint32_t MaterialLibrary::number_of(const SurfaceShading& shading) {
+  const auto floats = [](Vec3 v) { return std::array{v.x, v.y, v.z}; };
+  const ShadingKey key{shading.bits,
+                       {shading.diffuse, shading.eta, shading.roughness, shading.sigma},
+                       floats(shading.specular),
+                       floats(shading.transmission),
+                       floats(shading.emission),
+                       floats(shading.metal_eta),
+                       floats(shading.metal_k)};
+  return shading_numbers_.try_emplace(key, static_cast<uint32_t>(shading_numbers_.size())).first->second;
+}
+
+uint32_t MaterialLibrary::emission(Vec3 radiance) {
+  const auto [it, inserted] =
+      emission_numbers_.try_emplace({radiance.x, radiance.y, radiance.z}, static_cast<uint32_t>(emissions_.size()));
+  if (inserted) emissions_.push_back(radiance);
+  return it->second;
+}
+
 std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, MemoryReservation& memory, Reporter& reporter) {
   std::vector<Material>& materials = scene.materials;
   std::vector<AlphaMask>& masks = scene.masks;
@@ -349,7 +327,7 @@ std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, MemoryReservation& 
     it->second.first = result.kind;
     return it->second;
   };
-  using Key = std::tuple<std::string, MaterialFlags, std::array<float, 3>, uint32_t, uint32_t, uint32_t>;
+  using Key = std::tuple<std::string, MaterialFlags, std::array<float, 3>, uint32_t, uint32_t, uint32_t, uint32_t>;
   std::map<Key, uint32_t> numbers;
   std::vector<uint32_t> result;
   for (const MaterialUse& use : uses_) {
@@ -357,6 +335,7 @@ std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, MemoryReservation& 
     Material material{recipe.name, recipe.flags, albedo_of(definitions_[use.recipe], reporter), kNoMask, kNoMask};
     material.albedo_texture = texture_of(definitions_[use.recipe], scene, memory, reporter);
     if (use.area_light != kNone) material.flags |= use.area_light == 1 ? kEmissive | kEmitsBothSides : kEmissive;
+    if (shading_) material.shading = shading_of(definitions_[use.recipe], use, reporter);
     if (use.alpha != kNone) {
       const auto [kind, mask] = mask_of(use.alpha);
       material.alpha_mask = mask;
@@ -374,7 +353,8 @@ std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, MemoryReservation& 
                   {material.albedo.x, material.albedo.y, material.albedo.z},
                   material.alpha_mask,
                   material.shadow_alpha_mask,
-                  material.albedo_texture};
+                  material.albedo_texture,
+                  number_of(material.shading)};
     const auto [it, inserted] = numbers.try_emplace(key, static_cast<uint32_t>(materials.size()));
     if (inserted) materials.push_back(std::move(material));
     result.push_back(it->second);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -10,6 +11,7 @@
 
 #include "pbrt_import/language/graphics_state.h"
 #include "pbrt_import/language/parser.h"
+#include "pbrt_import/language/shading_recipe.h"
 #include "pbrt_import/language/texture_parameters.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -20,6 +22,8 @@ struct MaterialRecipe {
   std::string name; ///< the MakeNamedMaterial name, or the material's kind
   MaterialFlags flags = 0;
   TextureGraph::Node albedo = 0;
+  ShadingRecipe shading;
+  MetalIndices metal; ///< only set for metals
 };
 
 /// A recipe together with a shape's alpha textures and area light.
@@ -28,6 +32,7 @@ struct MaterialUse {
   uint32_t alpha = kNone;        ///< texture node; kNone: opaque
   uint32_t shadow_alpha = kNone; ///< texture node
   uint32_t area_light = kNone;   ///< like Attributes::area_light
+  uint32_t emission = kNone;     ///< like Attributes::emission; kNone if area_light is
   auto operator<=>(const MaterialUse&) const = default;
 };
 
@@ -35,6 +40,11 @@ struct MaterialUse {
 class MaterialLibrary {
 public:
   explicit MaterialLibrary(TextureGraph& graph);
+
+  /// Also reads what shading needs (Material::shading). Call before the first material.
+  void keep_shading() { shading_ = true; }
+  /// Number of an area light's radiance, for MaterialUse::emission. Equal ones get the same number.
+  uint32_t emission(Vec3 radiance);
 
   /// Number of pbrt's default material, for shapes before any Material directive.
   static constexpr uint32_t kDefault = 0;
@@ -69,13 +79,21 @@ private:
     MaterialRecipe recipe;
     Place place; ///< of the Material directive, or of the Shape that overrides parameters
   };
-  uint32_t add(std::string kind, std::string name, const TextureParameters& parameters);
+  uint32_t add(std::string kind, std::string name, const TextureParameters& parameters,
+               std::vector<std::string>& reduced);
+  SurfaceShading shading_of(const Definition& definition, const MaterialUse& use, Reporter& reporter);
+  uint32_t number_of(const SurfaceShading& shading);
   Vec3 albedo_of(const Definition& definition, Reporter& reporter);
   uint32_t texture_of(const Definition& definition, Scene& scene, MemoryReservation& memory, Reporter& reporter);
   uint32_t add_texture(std::vector<AlbedoTexture>& textures, AlbedoTexture texture);
 
   TextureGraph& graph_;
-  bool colours_ = false;
+  bool colours_ = false, shading_ = false;
+  std::map<std::array<float, 3>, uint32_t> emission_numbers_;
+  std::vector<Vec3> emissions_;
+  using Floats = std::array<float, 3>;
+  using ShadingKey = std::tuple<ShadingBits, std::array<float, 4>, Floats, Floats, Floats, Floats, Floats>;
+  std::map<ShadingKey, uint32_t> shading_numbers_;
   std::map<TextureGraph::Node, uint32_t> texture_of_node_; ///< kNoTexture: none
   std::unordered_multimap<size_t, uint32_t> textures_by_hash_;
   std::vector<Definition> definitions_;

@@ -33,9 +33,10 @@ struct ImageRequest {
   bool needed = false;   ///< a used material depends on it
   bool want_mask = false;
   bool want_colours = false;
-  bool missing = false;     ///< missing or unreadable: counts as 1 everywhere, as in pbrt
-  ImageSummary summary;     ///< filled in by FileLoader
-  MemoryReservation memory; ///< for the summary
+  bool want_radiance = false; ///< set by users of request_image()
+  bool missing = false;       ///< missing or unreadable: counts as 1 everywhere, as in pbrt
+  ImageSummary summary;       ///< filled in by FileLoader
+  MemoryReservation memory;   ///< for the summary
 };
 
 /// All textures of a scene as expressions over constants and images. The operands of a node have smaller numbers.

@@ -152,6 +152,10 @@ float TextureParameters::get_float(std::string_view name, float fallback) const 
   return first_.get_float(name, second_ ? second_->get_float(name, fallback) : fallback);
 }
 
+bool TextureParameters::get_bool(std::string_view name, bool fallback) const {
+  return first_.get_bool(name, second_ ? second_->get_bool(name, fallback) : fallback);
+}
+
 std::string TextureParameters::get_string(std::string_view name, std::string_view fallback) const {
   return first_.get_string(name, second_ ? second_->get_string(name, fallback) : std::string(fallback));
 }

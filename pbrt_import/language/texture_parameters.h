@@ -44,6 +44,7 @@ public:
   /// Whether a texture or value of this name exists. Marks it as used.
   bool has(std::string_view name) const;
   float get_float(std::string_view name, float fallback) const;
+  bool get_bool(std::string_view name, bool fallback) const;
   std::string get_string(std::string_view name, std::string_view fallback) const;
   /// File name of a spectrum parameter that is given as a file; empty if there is none.
   std::string_view spectrum_file(std::string_view name) const;

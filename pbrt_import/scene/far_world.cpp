@@ -90,6 +90,7 @@ private:
       camera.world_from_camera = moved(camera.world_from_camera, -origin);
       move_animation(camera.animation, origin);
     }
+    for (Light& light : scene_.lights) light.position -= origin;
   }
 
   void move_shapes(std::vector<Shape>& shapes, DVec3 zero) {

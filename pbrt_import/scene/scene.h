@@ -13,6 +13,7 @@
 #include "pbrt_import/scene/material_flags.h"
 #include "pbrt_import/scene/math.h"
 #include "pbrt_import/scene/rigid_motion.h"
+#include "pbrt_import/scene/shading.h"
 
 namespace packtrace {
 
@@ -40,6 +41,7 @@ struct Material {
   uint32_t alpha_mask = kNoMask;        ///< index into Scene::masks, for all rays
   uint32_t shadow_alpha_mask = kNoMask; ///< index into Scene::masks, for occlusion rays only
   uint32_t albedo_texture = kNoTexture; ///< index into Scene::textures; albedo is the texture's average
+  SurfaceShading shading{};             ///< the default unless Scene::has_shading
 };
 
 /// An invertible map and its decomposition: map = translation (its last column) * rotation * scale.
@@ -125,6 +127,9 @@ struct Scene {
   std::vector<Object> objects;
   std::vector<Instance> instances;
   std::vector<Camera> cameras; ///< empty if the file has none
+  bool has_shading = false;    ///< Material::shading and the lights are those of the file (ImportOptions::keep_shading)
+  std::vector<Light> lights;
+  std::vector<EnvironmentMap> environment_maps;
 
   /// World coordinates of this scene's zero, not 0 if the world was moved (move_far_world()): transforms and cameras
   /// map to world coordinates minus the origin.
