@@ -66,6 +66,7 @@ private:
     remove_empty_slots();
     check_level_chains();
     FileSections sections(scene_, textures_);
+    if (config_.purpose == baked::kShading) sections.add_shading(scene_);
     RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
       packed_[i].record.requirements = requirements.add(scene_, plan_.geometries[i], packed_[i].needs, packed_[i].stats,

@@ -87,6 +87,7 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
   Progress progress(display.observer());
 
   options.scene.keep_unused_objects = !options.distance_levels.empty(); // levels need no instance
+  options.scene.keep_shading = config.purpose == baked::kShading;
   const Stopwatch importing;
   ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   BakeTimings timings;

@@ -15,7 +15,7 @@ namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 20> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 23> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -34,6 +34,9 @@ std::array<Row, 20> stream_rows(const StreamBytes& bytes) {
            {"trees", bytes.trees},
            {"rigid_motion", bytes.rigid_motion},
            {"deformation", bytes.deformation},
+           {"shading_materials", bytes.shading_materials},
+           {"lights", bytes.lights},
+           {"environment_maps", bytes.environment_maps},
            {"header_and_alignment", bytes.header_and_alignment},
            {"total", bytes.total}}};
 }

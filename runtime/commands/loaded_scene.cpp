@@ -115,6 +115,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   options.time = scene_options.time;
   options.keep_textures = keep_textures;
   options.keep_unused_objects = scene_options.keep_unused_objects;
+  options.keep_shading = scene_options.keep_shading;
   options.memory = globals.memory;
   ImportResult result;
   try {

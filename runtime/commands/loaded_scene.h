@@ -29,6 +29,7 @@ struct SceneOptions {
   std::optional<uint32_t> world;
   std::optional<double> time;
   bool keep_unused_objects = false; ///< as in ImportOptions; no option of its own
+  bool keep_shading = false;        ///< as in ImportOptions; no option of its own
 };
 
 /// Adds --strict, --world and --time to a verb. `options` must outlive the verb.

@@ -97,6 +97,7 @@ py::object bake(const std::filesystem::path& scene, const std::filesystem::path&
     ImportOptions options;
     options.strict = strict;
     options.keep_textures = config.textures;
+    options.keep_shading = config.purpose == baked::kShading;
     options.memory = config.memory;
     ImportResult imported = import_scene(scene, options, diagnostics, progress);
     separate_motion(imported.scene);

@@ -177,10 +177,12 @@ BakedSections FileSections::without_trees() const {
 void FileSections::build_trees() { trees_ = build_packed_trees(without_trees()); }
 
 std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summary) {
-  return assemble_baked_file({geometries_,     clusters_,     payload_,       materials_,  instances_, masks_,
-                              mask_words_,     textures_,     texture_bytes_, cameras_,    strings_,   {&summary, 1},
-                              material_slots_, requirements_, lod_levels_,    lod_groups_, lod_links_, trees_.trees,
-                              rigid_motion_,   deformation_,  trees_.nodes});
+  baked::SummaryRecord complete = summary;
+  complete.shading_bytes = shading_.size();
+  return assemble_baked_file({geometries_,    clusters_,       payload_,       materials_,  instances_,  masks_,
+                              mask_words_,    textures_,       texture_bytes_, shading_,    cameras_,    strings_,
+                              {&complete, 1}, material_slots_, requirements_,  lod_levels_, lod_groups_, lod_links_,
+                              trees_.trees,   rigid_motion_,   deformation_,   trees_.nodes});
 }
 
 } // namespace packtrace

@@ -9,6 +9,7 @@
 #include "compress/bake/lod/lod_encoder.h"
 #include "compress/format/layout/baked_format.h"
 #include "compress/format/layout/bit_stream.h"
+#include "compress/format/shading/shading_codec.h"
 #include "compress/format/textures/texture_encoder.h"
 #include "compress/format/trees/packed_trees.h"
 #include "pbrt_import/scene/scene.h"
@@ -33,6 +34,8 @@ public:
 
   void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
   void set_rigid_motion(std::vector<uint8_t> bytes) { rigid_motion_ = std::move(bytes); }
+  /// Stores materials' shading, lights and environment maps. Throws as encode_shading() does.
+  void add_shading(const Scene& scene) { shading_ = encode_shading(scene); }
   void set_deformation(std::vector<uint8_t> bytes) { deformation_ = std::move(bytes); }
   void set_requirements(std::vector<baked::RequirementRecord> rows) { requirements_ = std::move(rows); }
 
@@ -76,7 +79,7 @@ private:
   std::vector<baked::LodGroupRecord> lod_groups_;
   std::vector<baked::LodLinkRecord> lod_links_;
   PackedTrees trees_;
-  std::vector<uint8_t> rigid_motion_, deformation_;
+  std::vector<uint8_t> rigid_motion_, deformation_, shading_;
   ClusterView::StreamBits stream_bits_;
 };
 

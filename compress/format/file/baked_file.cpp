@@ -150,10 +150,21 @@ std::vector<Material> BakedFile::materials() const {
   std::vector<Material> result;
   result.reserve(sections_.materials.size());
   for (const baked::MaterialRecord& record : sections_.materials)
-    result.push_back({std::string(text(record.name)), record.flags,
-                      Vec3(record.albedo[0], record.albedo[1], record.albedo[2]), record.alpha_mask,
-                      record.shadow_alpha_mask, record.albedo_texture});
+    result.push_back({std::string(text(record.name)),
+                      record.flags,
+                      Vec3(record.albedo[0], record.albedo[1], record.albedo[2]),
+                      record.alpha_mask,
+                      record.shadow_alpha_mask,
+                      record.albedo_texture,
+                      {}});
+  const std::vector<SurfaceShading> shading = this->shading().materials;
+  for (size_t i = 0; i < shading.size(); ++i) result[i].shading = shading[i];
   return result;
+}
+
+ShadingData BakedFile::shading() const {
+  if (!has_shading()) return {};
+  return read_shading(sections_.shading, sections_.materials.size());
 }
 
 std::vector<Camera> BakedFile::cameras() const {

@@ -10,6 +10,7 @@
 #include "compress/format/cluster/cluster_codec.h"
 #include "compress/format/layout/baked_format.h"
 #include "compress/format/pages/page_codec.h"
+#include "compress/format/shading/shading_codec.h"
 #include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/scene.h"
@@ -28,7 +29,8 @@ struct BakedSections {
   std::span<const baked::MaskRecord> masks;
   std::span<const uint32_t> mask_words;
   std::span<const baked::TextureRecord> textures;
-  std::span<const uint8_t> texture_bytes;
+  std::span<const uint8_t> texture_bytes; ///< without the shading behind them
+  std::span<const uint8_t> shading;       ///< read_shading() decodes it; empty: not baked for shading
   std::span<const baked::CameraRecord> cameras;
   std::span<const char> strings;
   std::span<const baked::SummaryRecord> summary; ///< exactly one record
@@ -92,6 +94,10 @@ public:
   AlphaMaskView mask(uint32_t index) const;
   TextureView texture(uint32_t index) const;
   std::vector<Material> materials() const;
+  /// Whether the file was baked for shading: materials() have their shading, and there are lights.
+  bool has_shading() const { return !sections_.shading.empty(); }
+  /// Materials' shading, lights and environment maps; empty without has_shading().
+  ShadingData shading() const;
   std::vector<Camera> cameras() const;
   /// World-space bounds of all instances at all times, relative to origin().
   Bounds world_bounds() const;

@@ -31,6 +31,7 @@ public:
     check_header();
     check_section_table();
     if (!zero_between_sections()) fail("nonzero bytes between sections");
+    check_shading();
     check_materials_and_masks();
     check_textures();
     check_instances();
@@ -105,6 +106,7 @@ private:
                  section<uint32_t>(baked::kMaskWords),
                  section<baked::TextureRecord>(baked::kTextures),
                  section<uint8_t>(baked::kTextureBytes),
+                 {},
                  section<baked::CameraRecord>(baked::kCameras),
                  section<char>(baked::kStrings),
                  section<baked::SummaryRecord>(baked::kSummary),
@@ -172,6 +174,17 @@ private:
       for (const float f : {m.uv_scale[0], m.uv_scale[1], m.uv_offset[0], m.uv_offset[1]})
         if (!std::isfinite(f)) fail("mask", i, "texture transform");
     }
+  }
+
+  /// Splits the shading from the texture bytes.
+  void check_shading() {
+    const uint64_t bytes = sections_.summary.front().shading_bytes;
+    if (bytes > sections_.texture_bytes.size()) fail("shading", 0, "extent");
+    sections_.shading = sections_.texture_bytes.last(static_cast<size_t>(bytes));
+    sections_.texture_bytes = sections_.texture_bytes.first(sections_.texture_bytes.size() - sections_.shading.size());
+    if (bytes == 0) return;
+    if (const auto fault = find_shading_fault(sections_.shading, sections_.materials.size()))
+      fail("shading", 0, *fault);
   }
 
   void check_textures() {

@@ -29,12 +29,16 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
   bytes.textures = s.textures.size_bytes() + s.texture_bytes.size();
   bytes.cameras = s.cameras.size_bytes();
+  if (file.has_shading()) {
+    const ShadingBytes shading = shading_bytes(s.shading, s.materials.size());
+    bytes.shading_materials = shading.materials, bytes.lights = shading.lights, bytes.environment_maps = shading.maps;
+  }
   bytes.strings = s.strings.size();
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
                                bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records -
-                               bytes.trees - bytes.rigid_motion - bytes.deformation;
+                               bytes.trees - bytes.rigid_motion - bytes.deformation - s.shading.size();
   return bytes;
 }
 
@@ -201,6 +205,10 @@ FileSummary summarize(const BakedFile& file) {
   summary.instances = s.instances.size();
   summary.materials = s.materials.size();
   summary.masks = s.masks.size();
+  const ShadingData shading = file.shading();
+  summary.lights = shading.lights.size();
+  summary.area_light_materials =
+      static_cast<uint64_t>(std::ranges::count_if(shading.materials, &SurfaceShading::emits));
   summary.cameras = s.cameras.size();
   summary.bytes = stream_bytes(file);
   summary.disk = file.disk();

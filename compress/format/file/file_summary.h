@@ -20,8 +20,9 @@ struct StreamBytes {
   uint64_t lod_records = 0;
   uint64_t trees = 0; ///< tree records and nodes
   uint64_t rigid_motion = 0, deformation = 0;
-  uint64_t header_and_alignment = 0; ///< includes the summary record
-  uint64_t total = 0;                ///< of the file
+  uint64_t shading_materials = 0, lights = 0, environment_maps = 0; ///< only in files baked for shading
+  uint64_t header_and_alignment = 0;                                ///< includes the summary record
+  uint64_t total = 0;                                               ///< of the file
 };
 
 /// A position grid and the number of geometries that use it.
@@ -92,6 +93,7 @@ struct LevelChainUse {
 /// all levels.
 struct FileSummary {
   uint64_t triangles = 0, placed_triangles = 0, vertices = 0, placed_vertices = 0, clusters = 0;
+  uint64_t lights = 0, area_light_materials = 0; ///< only in files baked for shading
   uint64_t geometries = 0, shared_geometries = 0, instances = 0, materials = 0, masks = 0, cameras = 0;
   StreamBytes bytes; ///< of the resident file (codec none)
   DiskForm disk;

@@ -9,12 +9,12 @@
 #include "compress/format/layout/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// Records of a .ptk file, version 8; docs/baked_format.md describes them. All values are little-endian. Every section
+/// Records of a .ptk file, version 9; docs/baked_format.md describes them. All values are little-endian. Every section
 /// starts at a multiple of 64 bytes. Bytes that belong to no field and no section are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 8;
+inline constexpr uint32_t kVersion = 9;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -28,7 +28,7 @@ enum Section : uint32_t {
   kMasks,
   kMaskWords, ///< uint32_t: texel rows of all masks
   kTextures,
-  kTextureBytes, ///< texels of all textures
+  kTextureBytes, ///< texels of all textures, then SummaryRecord::shading_bytes of shading, shading_codec.h
   kCameras,
   kStrings,       ///< UTF-8 bytes, not terminated
   kSummary,       ///< one record
@@ -238,6 +238,7 @@ struct SummaryRecord {
   uint64_t coinciding_triangles;       ///< equal to another triangle after quantisation; not stored
   double source_area;                  ///< of all placed triangles before quantisation, world units squared, about
   double collapsed_area;               ///< of collapsed_triangles, in the same units
+  uint64_t shading_bytes;              ///< last bytes of the texture bytes; 0: not baked for shading
 };
 
 template <typename T>
@@ -264,7 +265,7 @@ static_assert(kIsPod<TextureRecord> && sizeof(TextureRecord) == 56 && offsetof(T
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
 static_assert(kIsPod<RequirementRecord> && sizeof(RequirementRecord) == 40);
 static_assert(kAllRequirements == 0xffffff);
-static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 208 && offsetof(SummaryRecord, stream_bits) == 144 &&
+static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 216 && offsetof(SummaryRecord, stream_bits) == 144 &&
               offsetof(SummaryRecord, coinciding_triangles) == 184);
 
 /// Record size of each section in bytes.

@@ -123,6 +123,12 @@ Vec2 FloatSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) co
   return uvs[v.x] * (1.0f - barycentrics.x - barycentrics.y) + uvs[v.y] * barycentrics.x + uvs[v.z] * barycentrics.y;
 }
 
+bool FloatSource::may_emit(uint32_t instance) const {
+  const Geometry& g = geometries_[instances_[instance].geometry];
+  return std::ranges::any_of(std::span(parts_).subspan(g.first_part, g.part_count),
+                             [&](const Part& part) { return scene_.materials[part.material].shading.emits(); });
+}
+
 uint64_t FloatSource::resident_bytes() const {
   uint64_t bytes =
       parts_.size() * sizeof(Part) + geometries_.size() * sizeof(Geometry) + instances_.size() * sizeof(PlacedGeometry);
@@ -131,7 +137,7 @@ uint64_t FloatSource::resident_bytes() const {
              mesh.uvs.size() * sizeof(Vec2) + mesh.triangles.size() * sizeof(Triangle);
   for (const AlphaMask& mask : scene_.masks) bytes += mask.words.size() * sizeof(uint32_t);
   for (const AlbedoTexture& texture : scene_.textures) bytes += texture.rgb.size();
-  return bytes;
+  return bytes + map_bytes(scene_.environment_maps);
 }
 
 } // namespace packtrace

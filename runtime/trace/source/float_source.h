@@ -28,6 +28,10 @@ public:
   std::span<const Material> materials() const override { return scene_.materials; }
   AlphaMaskView mask(uint32_t index) const override { return view(scene_.masks[index]); }
   TextureView texture(uint32_t index) const override { return view(scene_.textures[index]); }
+  bool has_shading() const override { return scene_.has_shading; }
+  std::span<const Light> lights() const override { return scene_.lights; }
+  std::span<const EnvironmentMap> environment_maps() const override { return scene_.environment_maps; }
+  bool may_emit(uint32_t instance) const override;
   std::span<const Camera> cameras() const override { return scene_.cameras; }
   Bounds world_bounds() const override { return world_bounds_; }
   DVec3 origin() const override { return scene_.origin; }

@@ -54,6 +54,10 @@ public:
   std::span<const Material> materials() const override { return source_.materials(); }
   AlphaMaskView mask(uint32_t index) const override { return source_.mask(index); }
   TextureView texture(uint32_t index) const override { return source_.texture(index); }
+  bool has_shading() const override { return source_.has_shading(); }
+  std::span<const Light> lights() const override { return source_.lights(); }
+  std::span<const EnvironmentMap> environment_maps() const override { return source_.environment_maps(); }
+  bool may_emit(uint32_t instance) const override { return source_.may_emit(instance); }
   std::span<const Camera> cameras() const override { return source_.cameras(); }
   /// Bounds of LOD level 0.
   Bounds world_bounds() const override { return source_.world_bounds(); }

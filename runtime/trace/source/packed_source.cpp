@@ -1,5 +1,6 @@
 #include "runtime/trace/source/packed_source.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -36,7 +37,7 @@ Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycen
 }
 
 PackedSource::PackedSource(const BakedFile& file)
-    : file_(file), materials_(file.materials()), cameras_(file.cameras()), world_bounds_(file.world_bounds()) {
+    : file_(file), materials_(file.materials()), shading_(file.shading()), cameras_(file.cameras()), world_bounds_(file.world_bounds()) {
   instances_.reserve(file.instances().size());
   for (uint32_t i = 0; i < file.instances().size(); ++i)
     instances_.push_back({file.instances()[i].geometry, file.world_from_object(i)});
@@ -94,11 +95,16 @@ float PackedSource::position_error(uint32_t geometry) const {
 
 TextureView PackedSource::texture(uint32_t index) const { return file_.texture(index); }
 
+bool PackedSource::may_emit(uint32_t instance) const {
+  return std::ranges::any_of(file_.instance_materials(instance),
+                             [&](uint32_t material) { return materials_[material].shading.emits(); });
+}
+
 AlphaMaskView PackedSource::mask(uint32_t index) const { return file_.mask(index); }
 
 uint64_t PackedSource::resident_bytes() const {
   return file_.file_bytes() + materials_.size() * sizeof(Material) + cameras_.size() * sizeof(Camera) +
-         instances_.size() * sizeof(PlacedGeometry);
+         instances_.size() * sizeof(PlacedGeometry) + map_bytes(shading_.maps);
 }
 
 } // namespace packtrace

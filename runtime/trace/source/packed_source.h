@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "compress/format/shading/shading_codec.h"
 #include "runtime/trace/source/scene_source.h"
 
 namespace packtrace {
@@ -47,6 +48,10 @@ public:
   std::span<const Material> materials() const override { return materials_; }
   AlphaMaskView mask(uint32_t index) const override;
   TextureView texture(uint32_t index) const override;
+  bool has_shading() const override { return file_.has_shading(); }
+  std::span<const Light> lights() const override { return shading_.lights; }
+  std::span<const EnvironmentMap> environment_maps() const override { return shading_.maps; }
+  bool may_emit(uint32_t instance) const override;
   std::span<const Camera> cameras() const override { return cameras_; }
   Bounds world_bounds() const override { return world_bounds_; }
   DVec3 origin() const override;
@@ -60,6 +65,7 @@ public:
 private:
   const BakedFile& file_;
   std::vector<Material> materials_;
+  ShadingData shading_;
   std::vector<Camera> cameras_;
   std::vector<PlacedGeometry> instances_;
   Bounds world_bounds_;

@@ -35,6 +35,13 @@ struct SurfaceAttributes {
   Vec3 normal{0.0f};
 };
 
+/// Memory of environment maps' pixels.
+inline uint64_t map_bytes(std::span<const EnvironmentMap> maps) {
+  uint64_t bytes = 0;
+  for (const EnvironmentMap& map : maps) bytes += map.radiance.size() * sizeof(Vec3);
+  return bytes;
+}
+
 /// The level of detail of a triangle.
 struct SurfaceDetail {
   uint32_t level = 0;   ///< LOD level; 0: the source geometry
@@ -85,6 +92,13 @@ public:
   virtual AlphaMaskView mask(uint32_t index) const = 0;
   /// The texture of an index in Material::albedo_texture.
   virtual TextureView texture(uint32_t) const { return {}; }
+  /// Whether materials have their shading and there are lights; false: the file was not baked for shading.
+  virtual bool has_shading() const { return false; }
+  virtual std::span<const Light> lights() const { return {}; }
+  /// Maps of an index in Light::map.
+  virtual std::span<const EnvironmentMap> environment_maps() const { return {}; }
+  /// False if no triangle of an instance emits light.
+  virtual bool may_emit(uint32_t) const { return true; }
   virtual std::span<const Camera> cameras() const = 0;
   virtual Bounds world_bounds() const = 0;
   /// World coordinates of the zero that instances, cameras and bounds are relative to; see Scene::origin.

@@ -89,6 +89,26 @@ void put_motion(Dump& out, const BakedFile& file) {
   }
 }
 
+void put_shading(Dump& out, const BakedFile& file) {
+  out.put_number(file.has_shading() ? 1 : 0);
+  const ShadingData shading = file.shading();
+  for (const SurfaceShading& s : shading.materials) {
+    out.put_number(s.bits);
+    const Vec3 colours[] = {s.specular, s.transmission, s.emission, s.metal_eta, s.metal_k};
+    out.put(std::vector<float>{s.diffuse});
+    out.put(std::span<const Vec3>(colours));
+    out.put(std::vector<float>{s.eta, s.roughness, s.sigma});
+  }
+  for (const Light& light : shading.lights) {
+    out.put_number(static_cast<uint32_t>(light.kind));
+    out.put(std::span<const Vec3>(&light.radiance, 1));
+  }
+  for (const EnvironmentMap& map : shading.maps) {
+    out.put_number(map.width), out.put_number(map.height);
+    out.put(map.radiance);
+  }
+}
+
 std::vector<std::byte> dump(const BakedFile& file) {
   Dump out;
   out.put_number(static_cast<uint32_t>(file.geometries().size()));
@@ -119,6 +139,7 @@ std::vector<std::byte> dump(const BakedFile& file) {
   }
   for (uint32_t g = 0; g < file.base_geometry_count(); ++g) put_cut(out, file, g);
   put_motion(out, file);
+  put_shading(out, file);
   return out.bytes();
 }
 
@@ -288,6 +309,25 @@ TEST_F(IndependentReader, DecodesEveryCodecOfTextures) {
     dumped()[dumped().size() - 1 - sizeof(uint32_t)] ^= std::byte{1}; // the byte before the number of levels
     EXPECT_EQ(read(), 1) << "a texel that differs";
   }
+}
+
+TEST_F(IndependentReader, DecodesShading) {
+  Scene scene = test::scene_of(test::grid_mesh(4));
+  SurfaceShading& s = scene.materials[0].shading;
+  s = {kFresnelConductor | kThin, 0.5f, Vec3(0.1f), Vec3(0.2f), Vec3(0.3f), Vec3(2.0f), Vec3(3.0f), 1.4f, 0.5f, 10.0f};
+  for (uint32_t kind = 0; kind < 4; ++kind) {
+    Light light;
+    light.kind = static_cast<LightKind>(kind), light.radiance = Vec3(1.0f, 2.0f, static_cast<float>(kind));
+    if (light.kind == LightKind::kInfinite) light.map = 0;
+    scene.lights.push_back(light);
+  }
+  scene.environment_maps.push_back({"sky", 2, 1, {Vec3(0.1f, 0.2f, 0.3f), Vec3(1000.0f)}});
+  BakeConfig config;
+  config.purpose = baked::kShading;
+  write(scene, config);
+  expect_reads_every_codec();
+  dumped()[dumped().size() - 1] ^= std::byte{1};
+  EXPECT_EQ(read(), 1) << "a map that differs";
 }
 
 TEST_F(IndependentReader, DecodesGeometryOfMoreThanTwoToThe31Steps) {

@@ -5,6 +5,7 @@ import sys
 
 from ptk.motion import read_motion
 from ptk.records import LOD_LEVEL, NONE, to_float32
+from ptk.shading import compare_shading
 from ptk.textures import read_texels
 
 
@@ -54,6 +55,7 @@ def compare(baked, meshes, dump):
     - the numbers of tracks, moving instances and moving cameras (u32); per track its flags and the number of keys (u32),
       per key time, translation, rotation (w, x, y, z) and scale (17 floats); per moving instance its number, track and
       inner track (u32), pivot and error (4 floats); per moving camera its number and track (u32) and error (float)
+    - the shading: see compare_shading()
     Raises Differs."""
     require_equal("geometries", [len(meshes)], dump.take("I", 1))
     for number, mesh in enumerate(meshes):
@@ -99,5 +101,6 @@ def compare(baked, meshes, dump):
     for camera, track, error in cameras:
         require_equal("moving camera", [camera, track], dump.take("I", 2))
         require_equal("moving camera", [error], dump.take("f", 1))
+    compare_shading(baked, dump, require_equal)
     if dump.at != len(dump.data):
         raise Differs("the dump holds more than the file")

@@ -2,7 +2,7 @@
 
 import struct
 
-VERSION = 8
+VERSION = 9
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 576
 NONE = 0xFFFFFFFF
@@ -88,7 +88,7 @@ SUMMARY = Record(
     ("merged_vertices", "Q"), ("collapsed_triangles", "Q"), ("bounds_lo", "3d"), ("bounds_hi", "3d"),
     ("origin", "3d"), ("precision_value", "d"), ("precision_kind", "I"), ("world_step_mantissa", "I"), ("world_step_exponent", "i"),
     ("purpose", "I"), ("stream_bits", "4Q"), ("left_out", "Q"), ("coinciding_triangles", "Q"), ("source_area", "d"),
-    ("collapsed_area", "d"))
+    ("collapsed_area", "d"), ("shading_bytes", "Q"))
 
 REQUIREMENT = Record(
     ("stream", "I"), ("reason", "I"), ("geometries", "I"), ("reserved", "I"),
