@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/camera_rays.h"
+#include "runtime/ao/sampler.h"
+#include "runtime/camera/gbuffer.h"
+#include "runtime/shade/bsdf.h"
+#include "runtime/shade/light_set.h"
+#include "runtime/shade/shade_config.h"
+#include "runtime/trace/ray_tracer.h"
+
+namespace packtrace {
+
+/// What a scene's shading needs besides its surfaces: lights, and what is computed once per material.
+class ShadeScene {
+public:
+  /// @param source must outlive this object
+  explicit ShadeScene(const SceneSource& source);
+
+  const LightSet& lights() const { return lights_; }
+  const DirectionalAlbedo& albedo(uint32_t material) const { return albedos_[albedo_of_[material]]; }
+  /// Whether light may pass through some surface.
+  bool transmits() const { return transmits_; }
+
+private:
+  LightSet lights_;
+  std::vector<uint32_t> albedo_of_; ///< by material
+  std::vector<DirectionalAlbedo> albedos_;
+  bool transmits_ = false;
+};
+
+/// Radiance of one frame, linear sRGB, one entry per pixel.
+struct ShadedFrame {
+  ImageSize size;
+  std::vector<Vec3> direct;   ///< from the surface itself: emission and light of the lights; the background at misses
+  std::vector<Vec3> specular; ///< along reflections and transmissions
+  std::vector<Vec3> ambient;  ///< diffuse albedo times the ambient radiance, not occluded
+};
+
+/// Numbers and length of the samples of a frame.
+struct ShadeSamples {
+  SamplerKind sampler = SamplerKind::kSpaceTimeNet;
+  uint64_t seed = 0;
+  uint64_t frame = 0;          ///< number of the frame in the pixels' sequences
+  float ambient_radius = 1.0f; ///< world units: reach of the rays that occlude the ambient light behind mirrors
+};
+
+/// Traces the paths of one frame: from each pixel's surface along mirror and transmission directions, with shadow rays
+/// to the lights at each hit (docs/shading.md). The result is the same for any number of threads.
+/// @param source, tracer those of the G-buffer's camera rays
+/// @param scene of `source` or of the source that it shows levels of
+/// @param camera the G-buffer's
+/// @return number of rays. Throws Error(kCancelled).
+uint64_t trace_shading(const SceneSource& source, const RayTracer& tracer, const ShadeScene& scene,
+                       const PrimaryCamera& camera, const GBuffer& gbuffer, const ShadeConfig& config,
+                       const ShadeSamples& samples, ShadedFrame& frame, Progress& progress);
+
+} // namespace packtrace

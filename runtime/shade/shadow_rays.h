@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/shade/hit_surfaces.h"
+
+namespace packtrace {
+
+/// Rays along which light comes to the surfaces of a tile, with what they carry.
+class ShadowRays {
+public:
+  void clear() { rays_.clear(), carried_.clear(); }
+  size_t size() const { return rays_.size(); }
+
+  /// @param ray in the tracer's space, with a direction of unit length
+  /// @param pixel in the tile's list
+  void add(const Ray& ray, uint32_t pixel, Vec3 radiance) {
+    rays_.push_back(ray);
+    carried_.push_back({pixel, radiance});
+  }
+
+  /// Traces the rays and calls arrive(pixel, radiance) for those that nothing opaque blocks, in their order. Surfaces
+  /// that transmit light colour it.
+  /// @param glass whether the scene has such surfaces
+  /// @param shadow_depth number of them that light passes
+  template <class Arrive>
+  void trace(const RayTracer& tracer, const HitSurfaces& surfaces, bool glass, uint32_t shadow_depth,
+             const Arrive& arrive) {
+    occluded_.resize(rays_.size());
+    tracer.any_hits(rays_, kOcclusionRays, RayOrder::kIncoherent, occluded_);
+    if (glass) pass_glass(tracer, surfaces, shadow_depth);
+    for (size_t i = 0; i < rays_.size(); ++i)
+      if (occluded_[i] == 0) arrive(carried_[i].pixel, carried_[i].radiance);
+  }
+
+private:
+  struct Carried {
+    uint32_t pixel;
+    Vec3 radiance;
+  };
+  void pass_glass(const RayTracer& tracer, const HitSurfaces& surfaces, uint32_t shadow_depth);
+
+  std::vector<Ray> rays_, open_;
+  std::vector<Carried> carried_;
+  std::vector<uint8_t> occluded_;
+  std::vector<uint32_t> open_rays_; ///< numbers of open_
+  std::vector<RayHit> hits_, valid_;
+  std::vector<Ray> hit_rays_;
+  std::vector<HitPoint> points_;
+};
+
+} // namespace packtrace
