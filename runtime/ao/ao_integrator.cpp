@@ -204,6 +204,15 @@ private:
   AoFrame& out_;
 };
 
+/// The least number of samples of the pixels that get any.
+uint32_t least_samples(const SamplePlan& plan) {
+  if (plan.pixel_count.empty()) return plan.count;
+  uint32_t least = UINT16_MAX;
+  for (const uint16_t count : plan.pixel_count)
+    if (count > 0) least = std::min<uint32_t>(least, count);
+  return least;
+}
+
 } // namespace
 
 uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
@@ -213,6 +222,7 @@ uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuf
   ao.max_history.clear();
   ao.ray_length = config.radius;
   ao.stratified = is_stratified(config.sampler);
+  ao.samples = least_samples(plan);
   const AoTracer ao_tracer(source, tracer, gbuffer, config, plan, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
   tbb::enumerable_thread_specific<TileMemory> memory;

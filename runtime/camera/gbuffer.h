@@ -58,6 +58,9 @@ struct AoFrame {
   /// A pixel's samples of successive frames are stratified (is_stratified()): their mean errs less than that of
   /// independent samples with the same variance.
   bool stratified = false;
+  /// Number of samples whose mean each value of `ao` is, the least of all pixels. [1..65536]
+  /// 1 if camera rays are jittered within their pixels, because values then also differ by what the rays hit.
+  uint32_t samples = 1;
   /// Longest history in frames, not negative, that a pixel may keep from the frames before, as history_limits() finds
   /// it where something moved. Empty: no limits.
   std::vector<float> max_history;

@@ -62,13 +62,23 @@ void add_sequence_input_options(CLI::App& verb, DenoiseOptions& options) {
       ->delimiter(',')
       ->type_name("N")
       ->group(kSequenceGroup);
-  verb.add_flag("--still", options.still,
-                "All pictures show the same view, with camera rays jittered within their pixels: histories stay in "
-                "their pixels. An output name without a number gets the last picture")
-      ->group(kSequenceGroup);
+  CLI::Option* const still =
+      verb.add_flag("--still", options.still,
+                    "All pictures show the same view, with camera rays jittered within their pixels: histories stay in "
+                    "their pixels. An output name without a number gets the last picture")
+          ->group(kSequenceGroup);
   verb.add_flag("--stratified", options.stratified,
                 "The samples of a pixel are stratified over the pictures, as those of render are, not independent. "
                 "With the wrong choice detail is lost, or noise stays")
+      ->group(kSequenceGroup);
+  verb.add_option(
+          "--samples", options.samples,
+          "Number of samples of each pixel of a picture, 1..65536 (default 1). What the pictures of few samples "
+          "have as noise, those of many have as detail. Not with --still: its pictures show their noise by their "
+          "differences")
+      ->check(number_in(1, 65536))
+      ->excludes(still)
+      ->type_name("N")
       ->group(kSequenceGroup);
 }
 
@@ -121,6 +131,7 @@ LayeredConfig layered_config(const DenoiseOptions& options) {
   config.denoiser = denoiser_config(options.denoiser, options.denoiser_settings);
   config.still = options.still;
   config.stratified = options.stratified;
+  config.samples = options.samples;
   LayeredReading& reading = config.reading;
   reading.layers = options.layers;
   reading.raw_ao = options.still;

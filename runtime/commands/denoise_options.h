@@ -21,6 +21,7 @@ struct DenoiseOptions {
   std::optional<double> fov;
   std::optional<float> far_depth;
   bool inverted_ao = false, unsigned_normals = false, still = false, stratified = false, no_legend = false;
+  uint32_t samples = 1; ///< per pixel and picture
   std::optional<std::string> motion_scale, background;
   std::optional<uint64_t> frames, start;
   std::vector<uint64_t> cuts; ///< numbers of pictures that begin a shot

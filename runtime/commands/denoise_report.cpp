@@ -70,6 +70,7 @@ nlohmann::json denoise_json(const std::vector<DenoisedRow>& rows, const LayeredC
           {"denoiser", denoiser_json(config.denoise, config.denoiser)},
           {"still", config.still},
           {"stratified", config.stratified},
+          {"samples", config.samples},
           {"channels", channels_json(last.channels)},
           {"shots", starts},
           {"history", last.mean_history},

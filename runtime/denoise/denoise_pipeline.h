@@ -24,6 +24,9 @@ enum class HistorySource : uint8_t {
   /// From the same pixel, whatever its camera ray hits now. For frames of a still view whose camera rays are jittered
   /// within their pixels: the history then converges to the mean over the pixel's area.
   kPixel,
+  /// From the same pixel: the G-buffer is that of the frame before and nothing moves. The denoiser takes it on trust
+  /// and reads no guides, which takes time with kMotion. Without a frame before, the same as kMotion.
+  kUnchanged,
 };
 
 /// One of the denoisers behind AoDenoiser, which checks the arguments and describes the functions.

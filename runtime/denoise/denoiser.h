@@ -24,7 +24,8 @@ public:
   /// Denoises the next frame. A change of the image size discards the history, as reset() does. Negative and non-finite
   /// values of `ao` mean that the pixel has no sample in this frame. A pixel with a non-finite depth counts as a miss;
   /// a pixel with a non-finite normal gets no history and hardly any filter. Other pixels are not affected. Throws
-  /// Error (kUsage) if the two sizes differ or an array does not have one entry per pixel.
+  /// Error (kUsage) if the two sizes differ, an array does not have one entry per pixel, or AoFrame::samples is out of
+  /// range.
   /// @return the result, valid until the next call
   const DenoisedAo& next_frame(const GBuffer& gbuffer, const AoFrame& ao) {
     add_frame(gbuffer, ao);

@@ -92,10 +92,12 @@ VarianceTerms variance_terms(const FluxConfig& config, const FilterInput& input)
   t.ratio_prior = config.ratio_prior;
   t.longest_moving = static_cast<float>(config.max_tspp_moving), t.moving = input.moving;
   t.stratified = input.stratified;
+  t.per_sample = 1.0f / static_cast<float>(input.samples);
   if (t.stratified)
     t.still_factor = 0.75f, t.still_power = kStratifiedPower - 1.0f, t.moving_base = 0.55f, t.moving_gain = 0.02f;
   else
     t.young = kIndependentYoung;
+  t.most_spread = t.per_sample * std::min(1.0f, t.still_factor * std::pow(t.per_sample, t.still_power));
   return t;
 }
 

@@ -16,8 +16,9 @@ struct FilterInput {
   const Guides& guides;
   const PairGuides& pair_guides;
   const History& history;
-  bool moving;     ///< history was resampled, so that samples are not as well stratified as in a still view
-  bool stratified; ///< AoFrame::stratified
+  bool moving;      ///< history was resampled, so that samples are not as well stratified as in a still view
+  bool stratified;  ///< AoFrame::stratified
+  uint32_t samples; ///< AoFrame::samples
 };
 
 /// Where the filter writes; one entry per pixel, as in DenoisedAo.

@@ -47,6 +47,7 @@ private:
   AoFilter filter_;
   bool moving_ = false;     ///< something moved in the last frame
   bool stratified_ = false; ///< AoFrame::stratified of the last frame
+  uint32_t samples_ = 1;    ///< AoFrame::samples of the last frame
   DenoisedAo result_;
 };
 
@@ -71,13 +72,13 @@ bool FluxPipeline::load_guides(const GBuffer& gbuffer) {
 }
 
 void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
-  stratified_ = ao.stratified;
+  stratified_ = ao.stratified, samples_ = ao.samples;
   const bool same_pixels = source == HistorySource::kPixel && has_frame_;
   bool resample = false;
   if (same_pixels) {
     now_.guides.load(gbuffer);
     pair_guides_outdated_ = true;
-  } else {
+  } else if (source != HistorySource::kUnchanged || !has_frame_) {
     resample = load_guides(gbuffer);
   }
   moving_ = resample && has_frame_;
@@ -94,7 +95,7 @@ const DenoisedAo& FluxPipeline::denoise() {
   if (!has_frame_) return result_;
   if (pair_guides_outdated_) pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()));
   pair_guides_outdated_ = false;
-  filter_.run({now_.guides, pair_guides_, now_.history, moving_, stratified_},
+  filter_.run({now_.guides, pair_guides_, now_.history, moving_, stratified_, samples_},
               {result_.ao, result_.variance, result_.tspp});
   return result_;
 }

@@ -6,6 +6,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include "runtime/denoise/limit_frames.h"
 #include "runtime/denoise/local_statistics.h"
 #include "runtime/denoise/trend.h"
 
@@ -86,8 +87,8 @@ private:
                                            : PastRow{history.mean.row(y), history.square.row(y), history.fast.row(y),
                                                      history.samples.row(y)};
     if (!input.max_history.empty()) {
-      const float* limit = &input.max_history[static_cast<size_t>(y) * static_cast<size_t>(width_)];
-      for (size_t x = 0; x < limited_.size(); ++x) limited_[x] = std::min(past.samples[x], limit[x]);
+      limit_row(limited_.size(), &input.max_history[static_cast<size_t>(y) * limited_.size()], past.samples,
+                limited_.data());
       past.samples = limited_.data();
     }
     kernels_.accumulate(width_, &input.ao[static_cast<size_t>(y) * static_cast<size_t>(width_)],

@@ -254,6 +254,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   const SamplePlan plan = sample_plan(shaded, limits);
   report_.ao_rays = trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, plan, raw_, progress);
   raw_.max_history = std::move(limits);
+  if (config_.jitters()) raw_.samples = 1;
   report_.times.ao_s += tracing.seconds();
 
   const Stopwatch layering;
@@ -271,7 +272,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
     layers_.write_guides(guides_);
     denoiser_.add_frame(guides_, raw_, HistorySource::kPixel);
   } else {
-    denoiser_.add_frame(shaded, raw_);
+    denoiser_.add_frame(shaded, raw_, moved ? HistorySource::kMotion : HistorySource::kUnchanged);
   }
   report_.times.denoise_s += accumulating.seconds();
   camera_ = camera;

@@ -58,7 +58,7 @@ HistoryStart LayeredDenoiser::history_start(bool cut) {
 void LayeredDenoiser::add_to_history() {
   LayeredPicture& picture = result_->picture;
   if (!config_.denoise) return;
-  picture.ao.stratified = config_.stratified;
+  picture.ao.stratified = config_.stratified, picture.ao.samples = config_.samples;
   if (!config_.still) {
     denoiser_.add_frame(picture.gbuffer, picture.ao);
     return;

@@ -24,6 +24,7 @@ struct LayeredConfig {
   /// (HistorySource::kPixel).
   bool still = false;
   bool stratified = false;  ///< AoFrame::stratified of all pictures
+  uint32_t samples = 1;     ///< AoFrame::samples of all pictures; 1 if `still`
   bool view_layers = false; ///< fill the views of RenderedImage
 };
 

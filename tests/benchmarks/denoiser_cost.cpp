@@ -114,16 +114,17 @@ MemoryFloor floor_of(const AoDenoiser& warm, ImageSize size, bool moving, Denois
 } // namespace
 
 struct DenoiserCostMeter::State {
-  State(const DenoiserConfig& config, ImageSize size, bool moving, uint32_t warm_frames)
-      : gbuffer(make_room(size, moving ? kMotionPx : 0.0f)), frames{make_noise(size, 1), make_noise(size, 2)},
-        denoiser(config) {
+  State(const DenoiserConfig& config, ImageSize size, bool moves, uint32_t warm_frames)
+      : gbuffer(make_room(size, moves ? kMotionPx : 0.0f)), frames{make_noise(size, 1), make_noise(size, 2)},
+        denoiser(config), moving(moves) {
     for (uint32_t i = 0; i < warm_frames; ++i) denoiser.add_frame(gbuffer, frames[i % 2]);
     denoiser.denoise();
-    floor.emplace(floor_of(denoiser, size, moving, config.kind));
+    floor.emplace(floor_of(denoiser, size, moves, config.kind));
   }
   GBuffer gbuffer;
   AoFrame frames[2];
   AoDenoiser denoiser;
+  bool moving;
   std::optional<MemoryFloor> floor;
   Times history, filter, memory;
   size_t next = 0;
@@ -137,7 +138,8 @@ DenoiserCostMeter::~DenoiserCostMeter() = default;
 double DenoiserCostMeter::time_frame() {
   State& s = *state_;
   s.memory.time([&] { s.floor->run(); });
-  s.history.time([&] { s.denoiser.add_frame(s.gbuffer, s.frames[s.next++ % 2]); });
+  const HistorySource source = s.moving ? HistorySource::kMotion : HistorySource::kUnchanged; // as FrameLoop
+  s.history.time([&] { s.denoiser.add_frame(s.gbuffer, s.frames[s.next++ % 2], source); });
   s.filter.time([&] { s.denoiser.denoise(); });
   return (s.history.last_wall() + s.filter.last_wall()) * 1e-3;
 }

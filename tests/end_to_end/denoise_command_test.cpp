@@ -135,6 +135,27 @@ TEST(Denoise, PicturesOfAStillViewMakeOnePicture) {
   EXPECT_EQ(bench.denoise({bench / "in_%02d.exr", "-o", bench / "b.exr"}).exit_code, 2) << "which picture?";
 }
 
+TEST(Denoise, PicturesOfManySamplesKeepTheirDetail) {
+  const DenoiseBench bench;
+  bench.render(bench / "in.exr", {"--frames", "1", "--spp", "16", "--denoiser", "off", "--no-jitter"});
+  bench.render(bench / "truth.exr", {"--frames", "64", "--spp", "16", "--denoiser", "off", "--no-jitter"});
+  const std::vector<float> truth = bench.layer("truth.exr", "ao");
+  const auto error = [&](const char* samples) {
+    const CommandResult result = bench.denoise({bench / "in.exr", "-o", bench / "out.exr", "--stratified", "--samples",
+                                                samples, "--json", bench / "a.json", "--force"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(Json::parse(read_text(bench / "a.json")).at("samples"), std::stoi(samples));
+    const std::vector<float> out = bench.layer("out.exr", "ao");
+    double sum = 0.0;
+    for (size_t i = 0; i < out.size(); ++i) sum += std::pow(static_cast<double>(out[i] - truth[i]), 2.0);
+    return std::sqrt(sum / static_cast<double>(out.size()));
+  };
+  EXPECT_LT(error("16"), 0.9 * error("1"));
+  EXPECT_EQ(bench.denoise({bench / "in.exr", "-o", bench / "b.exr", "--samples", "4", "--still"}).exit_code, 2);
+  for (const char* const wrong : {"0", "65537", "1.5", "-1", "x"})
+    EXPECT_EQ(bench.denoise({bench / "in.exr", "-o", bench / "b.exr", "--samples", wrong}).exit_code, 2) << wrong;
+}
+
 TEST(Denoise, LayersAreChosenAsInRender) {
   const DenoiseBench bench;
   bench.render(bench / "in.exr", {"--frames", "1", "--denoiser", "off"});

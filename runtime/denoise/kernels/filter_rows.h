@@ -103,8 +103,12 @@ struct VarianceTerms {
   /// Variance of a mean times n / s2: still_factor n^-still_power if still, moving_base + moving_gain n if moving.
   float still_factor = 1, still_power = 0, moving_base = 1, moving_gain = 0, longest_moving = 0;
   float ratio_prior = 1; ///< weight of still_factor against the window's trends, in pixels
-  float young = 0;       ///< the filter is told 1 + young / n + distrust / n^2 times the variance of n frames
-  float distrust = 0;
+  /// 1 / N, where each frame's value is the mean of N samples. The filter is told
+  /// 1 + young / (N n) + distrust / (N n)^2 times the variance of n frames.
+  float per_sample = 1, young = 0, distrust = 0;
+  /// If N > 1, the variance of a value is at most most_spread m (1 - m) around a mean of m, since samples are between 0
+  /// and 1; what varies more is the occlusion itself.
+  float most_spread = 1;
   bool moving = false, stratified = false;
 };
 

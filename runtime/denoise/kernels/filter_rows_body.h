@@ -248,6 +248,7 @@ void variance_row(int width, const HistoryOfRow& history, const MomentWindow& wi
   const VarianceTerms t = terms;
   const FirstRow o = first;
   const float young_moving = t.moving ? 4.0f : 0.0f, longest_moving = t.moving ? t.longest_moving : 0.0f;
+  const bool means = t.per_sample < 1.0f;
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float a = h.mean[x], n = greater(h.samples[x], 1.0f);
@@ -264,6 +265,8 @@ void variance_row(int width, const HistoryOfRow& history, const MomentWindow& wi
     float spread = (t.prior * around + own * divisor) / ((t.prior + n - 1.0f) * divisor);
     spread = n < 2.0f ? space : spread;
     spread = n < young_moving ? greater(spread, 0.5f * space) : spread;
+    const float mean = value / count;
+    spread = means ? lesser(spread, mean * (1.0f - mean) * t.most_spread) : spread;
     const float measured = t.ratio_prior * t.still_factor * spread + decay;
     const float factor =
         t.stratified & (spread > 0.0f) ? measured / ((t.ratio_prior + decay_seen) * spread) : t.still_factor;
@@ -271,14 +274,16 @@ void variance_row(int width, const HistoryOfRow& history, const MomentWindow& wi
     const float moving = t.moving_base + t.moving_gain * n;
     const float ratio = lesser(n <= longest_moving ? moving : still, 1.0f);
     const float share = 1.0f / n, v = spread * (n < 2.0f ? 1.0f : ratio) * share;
+    const float sample_share = share * t.per_sample;
     const bool seen = h.samples[x] > 0.0f;
     estimate[x] = seen ? v : 0.0f;
-    const float told = seen ? v * (1.0f + share * (t.young + t.distrust * share)) : kMaxVariance * (1.0f + t.distrust);
+    const float told =
+        seen ? v * (1.0f + sample_share * (t.young + t.distrust * sample_share)) : kMaxVariance * (1.0f + t.distrust);
     const float root = reciprocal_root(2.0f * t.tolerance * told + 1e-6f);
     const float precision = lesser(greater(kPrecisionUnits * root + 0.5f, 1.0f), kMostPrecision);
     o.value[x] = in_ao_units(a);
     o.precision[x] = static_cast<uint16_t>(static_cast<int>(h.disparity[x] > 0.0f ? precision : 0.0f));
-    o.lone[x] = static_cast<uint16_t>(static_cast<int>(8192.0f * (kLoneBase + kLoneYoung * share)));
+    o.lone[x] = static_cast<uint16_t>(static_cast<int>(8192.0f * (kLoneBase + kLoneYoung * sample_share)));
   }
 }
 

@@ -11,29 +11,25 @@ extern const HistoryKernels kHistoryKernelsScalar, kHistoryKernelsAvx2, kHistory
 
 namespace {
 
-void require_isa(Isa isa) {
+struct KernelSet {
+  const FilterKernels& filter;
+  const HistoryKernels& history;
+};
+
+KernelSet kernels_for(Isa isa) {
   if (!isa_supported(isa))
     throw Error(ErrorKind::kUnsupported, "denoiser: this machine lacks the instruction set that PACKTRACE_ISA names");
+#if defined(__x86_64__)
+  if (isa == Isa::kAvx512) return {kFilterKernelsAvx512, kHistoryKernelsAvx512};
+  if (isa == Isa::kAvx2) return {kFilterKernelsAvx2, kHistoryKernelsAvx2};
+#endif
+  return {kFilterKernelsScalar, kHistoryKernelsScalar};
 }
 
 } // namespace
 
-const HistoryKernels& history_kernels(Isa isa) {
-  require_isa(isa);
-#if defined(__x86_64__)
-  if (isa == Isa::kAvx512) return kHistoryKernelsAvx512;
-  if (isa == Isa::kAvx2) return kHistoryKernelsAvx2;
-#endif
-  return kHistoryKernelsScalar;
-}
+const FilterKernels& filter_kernels(Isa isa) { return kernels_for(isa).filter; }
 
-const FilterKernels& filter_kernels(Isa isa) {
-  require_isa(isa);
-#if defined(__x86_64__)
-  if (isa == Isa::kAvx512) return kFilterKernelsAvx512;
-  if (isa == Isa::kAvx2) return kFilterKernelsAvx2;
-#endif
-  return kFilterKernelsScalar;
-}
+const HistoryKernels& history_kernels(Isa isa) { return kernels_for(isa).history; }
 
 } // namespace packtrace

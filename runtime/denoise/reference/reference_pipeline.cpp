@@ -82,7 +82,7 @@ reference::BlurScale ReferencePipeline::blur_scale(const GBuffer& gbuffer, const
 }
 
 void ReferencePipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
-  if (frames_ == 0 || source == HistorySource::kMotion) {
+  if (frames_ == 0 || source != HistorySource::kPixel) {
     std::swap(now_, before_);
     if (frames_ == 0) before_.history.clear(gbuffer.size);
     now_.surfaces.load(gbuffer);

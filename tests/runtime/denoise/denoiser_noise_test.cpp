@@ -132,6 +132,59 @@ TEST(AoDenoiser, VarianceIsThatOfTheTemporalMean) {
   }
 }
 
+/// Stripes of occlusion 4 pixels wide on one wall: noise and detail look alike, unless the number of samples is known.
+float striped(uint32_t x) { return x / 4 % 2 != 0 ? 0.3f : 0.7f; }
+
+AoFrame striped_means(uint32_t samples, uint32_t number) {
+  AoFrame frame = synthetic::samples(kSize, [&](uint32_t x, uint32_t y) {
+    float sum = 0.0f;
+    for (uint32_t i = 0; i < samples; ++i) sum += noisy(striped(x), x, y, number * samples + i);
+    return sum / static_cast<float>(samples);
+  });
+  frame.samples = samples;
+  return frame;
+}
+
+/// RMSE after some frames of means of `samples`, of which the denoiser is told.
+double striped_error(uint32_t samples, uint32_t told, uint32_t frames) {
+  AoDenoiser denoiser;
+  const DenoisedAo* result = nullptr;
+  for (uint32_t f = 0; f < frames; ++f) {
+    AoFrame frame = striped_means(samples, f);
+    frame.samples = told;
+    result = &denoiser.next_frame(wall(kSize), frame);
+  }
+  return rmse_of(result->ao, kSize, all(kSize), [](uint32_t x, uint32_t) { return expected(striped(x)); });
+}
+
+TEST(AoDenoiser, PicturesOfManySamplesKeepTheirDetail) {
+  EXPECT_LT(striped_error(16, 16, 1), 0.8 * striped_error(16, 1, 1));
+  EXPECT_LT(striped_error(16, 16, 4), 0.8 * striped_error(16, 1, 4));
+  EXPECT_LT(striped_error(64, 64, 1), 0.8 * striped_error(64, 1, 1));
+  EXPECT_GT(striped_error(1, 64, 1), striped_error(1, 1, 1)) << "noise that is taken for detail";
+}
+
+TEST(AoDenoiser, FlatsOfManySamplesAreNoNoisierForTheirNumber) {
+  for (const uint32_t frames : {1u, 8u}) {
+    const auto error = [&](uint32_t told) {
+      AoDenoiser denoiser;
+      const DenoisedAo* result = nullptr;
+      for (uint32_t f = 0; f < frames; ++f) {
+        AoFrame frame = samples(kSize, [&](uint32_t x, uint32_t y) {
+          float sum = 0.0f;
+          for (uint32_t i = 0; i < 16; ++i) sum += noisy(0.5f, x, y, f * 16 + i);
+          return sum / 16.0f;
+        });
+        frame.samples = told;
+        result = &denoiser.next_frame(wall(kSize), frame);
+      }
+      return rmse_of(result->ao, kSize, all(kSize), [](uint32_t, uint32_t) { return expected(0.5f); });
+    };
+    EXPECT_LT(error(16), 1.6 * error(1)) << frames;
+    EXPECT_LT(error(16), 0.3 * 0.375 / 4.0 / std::sqrt(static_cast<double>(frames))) << frames;
+  }
+}
+
 TEST(AoDenoiser, LongStillHistoryIsThePlainMeanOfItsSamples) {
   const ImageSize size{48, 32};
   DenoiserConfig config;
