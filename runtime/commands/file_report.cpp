@@ -148,6 +148,13 @@ nlohmann::json sequences_json(const FileSummary& s) {
 
 } // namespace
 
+std::vector<std::pair<std::string, uint64_t>> stream_bytes(const StreamBytes& bytes) {
+  std::vector<std::pair<std::string, uint64_t>> streams;
+  for (const auto& [name, count] : stream_rows(bytes))
+    if (count > 0) streams.emplace_back(name, count);
+  return streams;
+}
+
 const std::locale& grouped() {
   struct Thousands : std::numpunct<char> {
     char do_thousands_sep() const override { return ','; }

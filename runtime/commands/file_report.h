@@ -2,6 +2,8 @@
 
 #include <locale>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -12,6 +14,9 @@ namespace packtrace {
 /// Contents of a baked file as JSON for `info --json` and `bake --json` (docs/json_output.md).
 /// @param by_geometry also list the streams required by each geometry
 nlohmann::json to_json(const FileSummary& summary, bool by_geometry);
+
+/// The streams of a file with their names in reports, without those that are empty, and the total.
+std::vector<std::pair<std::string, uint64_t>> stream_bytes(const StreamBytes& bytes);
 
 /// Locale for fmt's {:L} that prints 1234567 as 1,234,567, independent of the user's locale.
 const std::locale& grouped();

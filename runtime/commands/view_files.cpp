@@ -1,12 +1,15 @@
 #include "runtime/commands/view_files.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "compress/format/file/baked_file.h"
+#include "compress/format/file/file_summary.h"
 #include "pbrt_import/scene/world_view.h"
+#include "runtime/commands/file_report.h"
 #include "runtime/commands/render_camera.h"
 #include "runtime/commands/whole_number.h"
 #include "runtime/motion/motion_targets.h"
@@ -21,6 +24,12 @@ struct LoadedView {
   LoadedScene scene; ///< not movable: its source refers to it
   SceneMotion motion;
   std::vector<std::string> instance_names; ///< empty until they are needed
+  std::optional<FileSummary> summary;      ///< the same
+
+  const FileSummary& file_summary() {
+    if (!summary) summary = summarize(*scene.baked);
+    return *summary;
+  }
 };
 
 MotionTargets targets_of(const LoadedScene& scene) {
@@ -94,6 +103,14 @@ ViewFile load_view_file(const std::string& name, const RenderOptions& options, c
     return cache->instance_names;
   };
   file.material_names = material_names(loaded->scene);
+  if (baked != nullptr) {
+    file.stream_bytes = [cache = loaded.get()] { return stream_bytes(cache->file_summary().bytes); };
+    file.geometry_names = [cache = loaded.get()] {
+      std::vector<std::string> names;
+      for (const GeometryUse& use : cache->file_summary().by_geometry) names.push_back(use.name);
+      return names;
+    };
+  }
   file.words = loading_words(options);
   file.base_camera = base_camera(options);
   return file;

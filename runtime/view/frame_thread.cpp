@@ -81,6 +81,16 @@ void FrameThread::set_pick(std::optional<std::array<uint32_t, 2>> pixel) {
   wake_.notify_all();
 }
 
+void FrameThread::show_contents(bool shown) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (contents_shown_ == shown) return;
+    contents_shown_ = shown;
+    republish_ = true;
+  }
+  wake_.notify_all();
+}
+
 void FrameThread::set_message(const std::string& message) {
   set_status(message);
   host_.message(message);
@@ -208,6 +218,7 @@ void FrameThread::publish(double step_ms) {
   const std::lock_guard lock(mutex_);
   if (pick_ && (*pick_)[0] < s.size().width && (*pick_)[1] < s.size().height)
     shown->pick = s.pick(s.pane_at((*pick_)[0]), (*pick_)[0], (*pick_)[1]);
+  if (contents_shown_) shown->contents = s.contents(0);
   shown->number = ++published_;
   shown->frame_ms = step_ms + 1e3 * watch.seconds();
   session_->add_frame_time(shown->frame_ms);

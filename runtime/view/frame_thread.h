@@ -32,7 +32,8 @@ struct ViewSnapshot {
   SplitMode split = SplitMode::kOff;
   double divider = 0.5, gain = 8.0, speed = 0.0, target_ms = 0.0;
   bool paused = false, plays = false, orbits = false, recording = false;
-  std::optional<Pick> pick; ///< of the last set_pick()
+  std::optional<Pick> pick;             ///< of the last set_pick()
+  std::optional<FileContents> contents; ///< of the first pane, if show_contents()
   std::optional<DifferenceMetrics> metrics;
   std::string command; ///< of the first pane; empty while something moves
 };
@@ -73,6 +74,8 @@ public:
   void post_reading(Task task);
   /// The pixel whose pick() the snapshots have; none: no pick.
   void set_pick(std::optional<std::array<uint32_t, 2>> pixel);
+  /// Whether the snapshots have the contents of the file.
+  void show_contents(bool shown);
   /// Shows a message: what was saved, or why something failed. May be called from any thread.
   void set_message(const std::string& message);
   /// Shows how far something is, until the next message. May be called from any thread.
@@ -106,7 +109,8 @@ private:
   std::optional<std::array<uint32_t, 2>> pick_;
   std::string message_;
   std::pair<std::string, double> loading_{"loading", 0.0};
-  bool republish_ = false; ///< the pick changed
+  bool contents_shown_ = false;
+  bool republish_ = false; ///< the pick or contents_shown_ changed
   std::shared_ptr<const ViewSnapshot> snapshot_;
   std::exception_ptr failure_;
   std::atomic<bool> quit_{false};     ///< end the thread

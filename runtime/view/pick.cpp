@@ -61,17 +61,20 @@ Pick pick_pixel(const ViewFile& file, const PaneRenderer& pane, uint32_t x, uint
 }
 
 std::vector<std::string> pick_lines(const Pick& p) {
-  std::vector<std::string> lines{fmt::format("pixel {}, {}", p.x, p.y)};
-  if (!p.hit) {
-    lines.emplace_back("nothing");
-    return lines;
-  }
-  lines.push_back(fmt::format("ao {:.4f}, last frame {:.4f}", p.ao, p.ao_raw));
-  lines.push_back(fmt::format("depth {:.6g}", p.depth));
+  if (!p.hit) return {"nothing"};
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("ao {:.4f}, last frame {:.4f}, depth {:.5g}", p.ao, p.ao_raw, p.depth));
   lines.push_back(fmt::format("normal {:.4f} {:.4f} {:.4f}", p.normal.x, p.normal.y, p.normal.z));
   lines.push_back(fmt::format("albedo {:.4f} {:.4f} {:.4f}", p.albedo.x, p.albedo.y, p.albedo.z));
   lines.push_back(fmt::format("instance {} {}", p.instance, p.surface ? p.surface->instance_name : ""));
-  for (const auto& [name, value] : p.views) lines.push_back(fmt::format("{} {:.6g}", name, value));
+  for (size_t i = 0; i < p.views.size(); ++i) { // two in a line
+    const auto& [name, value] = p.views[i];
+    const std::string text = fmt::format("{} {:.5g}", name, value);
+    if (i % 2 == 0)
+      lines.push_back(text);
+    else
+      lines.back() += ", " + text;
+  }
   if (!p.surface) return lines;
   const Pick::Surface& s = *p.surface;
   lines.push_back(fmt::format("position {:.6g} {:.6g} {:.6g}", s.position.x, s.position.y, s.position.z));

@@ -36,7 +36,7 @@ struct Pick {
 /// @param x, y within the image, which must be resolved
 Pick pick_pixel(const ViewFile& file, const PaneRenderer& pane, uint32_t x, uint32_t y);
 
-/// The pick in lines of text, "depth 3.25" and the like.
+/// The pick in lines of text without its pixel, "depth 3.25" and the like.
 std::vector<std::string> pick_lines(const Pick& pick);
 
 } // namespace packtrace

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/frame/scene_state.h"
@@ -19,8 +20,12 @@ struct ViewFile {
   /// Names of the instances, by number. Called when the first is needed.
   std::function<const std::vector<std::string>&()> instance_names;
   std::vector<std::string> material_names; ///< by number
-  std::vector<std::string> words;          ///< options of `render` that load the file so, such as --world 2
-  std::string base_camera = "0";           ///< `render --camera` that gives the camera to start from
+  /// Bytes by stream, and names of the geometries; not set for a .pbrt scene. Take a while: called when a panel shows
+  /// them.
+  std::function<std::vector<std::pair<std::string, uint64_t>>()> stream_bytes;
+  std::function<std::vector<std::string>()> geometry_names;
+  std::vector<std::string> words; ///< options of `render` that load the file so, such as --world 2
+  std::string base_camera = "0";  ///< `render --camera` that gives the camera to start from
 
   bool moves() const { return moving.motion != nullptr || moving.deforms; }
 };

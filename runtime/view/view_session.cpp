@@ -266,6 +266,12 @@ DifferenceMetrics ViewSession::metrics() {
   return difference_metrics(image(0), panes_[0].image_layer(), image(1), panes_[1].image_layer());
 }
 
+FileContents ViewSession::contents(size_t pane) const {
+  require_view(renderers_[0] != nullptr, "no frame has been rendered yet");
+  const size_t shown = renderers_.at(pane) ? pane : 0;
+  return file_contents(files_[panes_[shown].file], *renderers_[shown]);
+}
+
 Pick ViewSession::pick(size_t pane, uint32_t x, uint32_t y) {
   resolve();
   const size_t shown = renderers_.at(pane) ? pane : 0;

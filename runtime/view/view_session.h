@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "runtime/image/image.h"
+#include "runtime/view/file_contents.h"
 #include "runtime/view/pane.h"
 #include "runtime/view/pick.h"
 #include "runtime/view/quality_control.h"
@@ -123,6 +124,8 @@ public:
   /// The picture on the screen, as three channels of display values, without legends.
   Image picture();
   DifferenceMetrics metrics();
+  /// What the file of a pane consists of; of the first pane for one that is not shown.
+  FileContents contents(size_t pane) const;
   /// @param x, y pixel of the picture of size()
   Pick pick(size_t pane, uint32_t x, uint32_t y);
   /// The pane at a column of the picture.

@@ -10,7 +10,9 @@ namespace packtrace {
 namespace {
 
 constexpr size_t kGraphFrames = 120;
-constexpr float kPanelWidth = 300.0f, kMargin = 8.0f;
+constexpr float kPanelWidth = 324.0f, kMargin = 8.0f;
+constexpr float kAlpha = 0.75f; ///< of the panels' background
+constexpr float kWidgetWidth = 104.0f, kGraphHeight = 48.0f;
 
 void text_line(const std::string& text) { ImGui::TextUnformatted(text.c_str(), text.c_str() + text.size()); }
 
@@ -60,7 +62,7 @@ bool edit_setting(const ViewSetting& s, std::string& value) {
   value = s.value;
   const std::string label = "##" + s.name;
   bool changed = false;
-  ImGui::SetNextItemWidth(120.0f);
+  ImGui::SetNextItemWidth(kWidgetWidth);
   if (!s.words.empty()) {
     changed = choose(label.c_str(), s.words, value);
   } else if (s.is_switch) {
@@ -98,6 +100,25 @@ void draw_settings(const std::vector<ViewSetting>& settings, size_t pane, FrameT
   }
 }
 
+/// The files as tabs, of which a pane shows one.
+void draw_tabs(size_t pane, const ViewSnapshot& shown, FrameThread& frames) {
+  for (size_t i = 0; i < shown.files.size(); ++i) {
+    const std::string& file = shown.files[i];
+    const std::string name = fmt::format("{}##{}", file.substr(file.find_last_of('/') + 1), i);
+    const bool active = i == shown.pane_files[pane];
+    const float width = ImGui::CalcTextSize(name.c_str(), nullptr, true).x + 2 * ImGui::GetStyle().FramePadding.x;
+    if (i > 0) {
+      ImGui::SameLine();
+      if (ImGui::GetContentRegionAvail().x < width) ImGui::NewLine();
+    }
+    ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(active ? ImGuiCol_TabActive : ImGuiCol_Tab));
+    if (ImGui::Button(name.c_str()) && !active)
+      frames.post([pane, i](ViewSession& session, ViewControls&) { session.set_file(pane, i); });
+    ImGui::PopStyleColor();
+    tooltip(file);
+  }
+}
+
 /// Chooses the file and the view of a pane.
 void draw_pane(size_t pane, const ViewSnapshot& shown, FrameThread& frames) {
   ImGui::PushID(static_cast<int>(pane));
@@ -105,15 +126,7 @@ void draw_pane(size_t pane, const ViewSnapshot& shown, FrameThread& frames) {
   ImGui::SetNextItemWidth(150.0f);
   if (choose(pane == 0 ? "view" : "second view", view_layer_names(), layer))
     frames.post([pane, layer](ViewSession& session, ViewControls&) { session.set_layer(pane, layer); });
-  if (shown.files.size() > 1) {
-    ImGui::SetNextItemWidth(150.0f);
-    if (ImGui::BeginCombo("file", shown.files[shown.pane_files[pane]].c_str())) {
-      for (size_t i = 0; i < shown.files.size(); ++i)
-        if (ImGui::Selectable(shown.files[i].c_str(), i == shown.pane_files[pane]))
-          frames.post([pane, i](ViewSession& session, ViewControls&) { session.set_file(pane, i); });
-      ImGui::EndCombo();
-    }
-  }
+  if (shown.files.size() > 1) draw_tabs(pane, shown, frames);
   ImGui::PopID();
 }
 
@@ -132,8 +145,9 @@ void draw_split(const ViewSnapshot& shown, FrameThread& frames) {
   if (ImGui::SliderFloat("gain", &gain, 1.0f, 100.0f, "%.3g", ImGuiSliderFlags_Logarithmic))
     frames.post([gain](ViewSession& session, ViewControls&) { session.set_gain(double{gain}); });
   if (shown.metrics)
-    text_line(fmt::format("RMSE {:.4f}, PSNR {:.2f} dB, FLIP {:.4f}", shown.metrics->rmse, shown.metrics->psnr,
-                          shown.metrics->flip));
+    text_line(shown.metrics->rmse > 0.0 ? fmt::format("RMSE {:.4f}, PSNR {:.2f} dB, FLIP {:.4f}", shown.metrics->rmse,
+                                                      shown.metrics->psnr, shown.metrics->flip)
+                                        : "both pictures are equal");
 }
 
 void draw_help(bool& shown) {
@@ -149,14 +163,59 @@ void draw_help(bool& shown) {
   ImGui::End();
 }
 
+/// At the right, so that the middle of the picture stays free.
 void draw_pick(const Pick& pick, float bottom) {
-  ImGui::SetNextWindowPos({2.0f * kMargin + kPanelWidth, bottom}, ImGuiCond_Always, {0.0f, 1.0f});
-  ImGui::SetNextWindowBgAlpha(0.75f);
-  if (ImGui::Begin("Under the mouse", nullptr,
+  ImGui::SetNextWindowPos({ImGui::GetIO().DisplaySize.x - kMargin, bottom}, ImGuiCond_Always, {1.0f, 1.0f});
+  ImGui::SetNextWindowSizeConstraints({kPanelWidth, 0.0f}, {2.0f * kPanelWidth, 2000.0f});
+  ImGui::SetNextWindowBgAlpha(kAlpha);
+  if (ImGui::Begin(fmt::format("Under the mouse: {}, {}###pick", pick.x, pick.y).c_str(), nullptr,
                    ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
                        ImGuiWindowFlags_NoFocusOnAppearing))
     for (const std::string& line : pick_lines(pick)) text_line(line);
   ImGui::End();
+}
+
+/// The times of frames, with lines at their median and 99th percentile.
+void draw_graph(const std::vector<float>& ms, double median, double p99) {
+  const float top = 1.1f * std::max(*std::ranges::max_element(ms), 1e-3f);
+  ImGui::PlotLines("##ms", ms.data(), static_cast<int>(ms.size()), 0, nullptr, 0.0f, top,
+                   {ImGui::GetContentRegionAvail().x, kGraphHeight});
+  const ImVec2 lo = ImGui::GetItemRectMin(), hi = ImGui::GetItemRectMax();
+  const auto line = [&](double value, ImU32 color) {
+    const float y = hi.y - (hi.y - lo.y) * static_cast<float>(value) / top;
+    ImGui::GetWindowDrawList()->AddLine({lo.x, y}, {hi.x, y}, color);
+  };
+  line(median, IM_COL32(120, 220, 120, 200));
+  line(p99, IM_COL32(255, 120, 80, 200));
+}
+
+/// Rows with a bar for their part of the largest.
+void draw_rows(const char* title, const FileContents::Rows& rows, const char* unit) {
+  if (rows.empty()) return;
+  ImGui::TextDisabled("%s", title);
+  uint64_t largest = 1;
+  for (const auto& [name, value] : rows) largest = std::max(largest, value);
+  for (const auto& [name, value] : rows) {
+    ImGui::ProgressBar(static_cast<float>(static_cast<double>(value) / static_cast<double>(largest)), {60.0f, 12.0f},
+                       "");
+    ImGui::SameLine();
+    std::string words = name;
+    std::ranges::replace(words, '_', ' ');
+    text_line(fmt::format("{:>8.1f} {} {}", 1e-3 * static_cast<double>(value), unit, words));
+  }
+}
+
+/// What the first pane's file consists of.
+void draw_contents(const ViewSnapshot& shown, FrameThread& frames) {
+  const bool open = ImGui::CollapsingHeader("File");
+  frames.show_contents(open);
+  if (!open || !shown.contents) return;
+  const FileContents& contents = *shown.contents;
+  draw_rows("bytes by stream", contents.streams, "kB");
+  draw_rows("in memory for tracing", contents.resident, "kB");
+  if (!contents.plan.empty()) ImGui::TextDisabled("levels of detail");
+  for (const std::string& line : contents.plan) text_line(line);
+  draw_rows("triangles by geometry", contents.traced, "k");
 }
 
 /// The message, or the command that makes the picture. Returns the top of the line.
@@ -166,7 +225,7 @@ float draw_message(const std::string& message, const std::string& command) {
   if (text.empty()) return screen.y - kMargin;
   ImGui::SetNextWindowPos({kMargin, screen.y - kMargin}, ImGuiCond_Always, {0.0f, 1.0f});
   ImGui::SetNextWindowSize({screen.x - 2 * kMargin, 0.0f});
-  ImGui::SetNextWindowBgAlpha(0.75f);
+  ImGui::SetNextWindowBgAlpha(kAlpha);
   float top = screen.y - kMargin;
   if (ImGui::Begin("##message", nullptr,
                    ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
@@ -202,16 +261,16 @@ void Panels::draw_times(const ViewSnapshot& snapshot) const {
   const double median = double{sorted[sorted.size() / 2]}, p99 = double{sorted[(sorted.size() * 99) / 100]};
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x - kMargin, kMargin}, ImGuiCond_Always, {1.0f, 0.0f});
-  ImGui::SetNextWindowBgAlpha(0.75f);
+  ImGui::SetNextWindowSizeConstraints({kPanelWidth, 0.0f}, {kPanelWidth, screen.y});
+  ImGui::SetNextWindowBgAlpha(kAlpha);
   if (ImGui::Begin("Times", nullptr, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings)) {
-    ImGui::PlotLines("##ms", ms_.data(), static_cast<int>(ms_.size()), 0, nullptr, 0.0f, 1.2f * sorted.back(),
-                     {220.0f, 48.0f});
+    draw_graph(ms_, median, p99);
     text_line(fmt::format("median {:.1f} ms, 99 % below {:.1f} ms", median, p99));
     for (const auto& [name, member] : kPasses)
       if (const double s = snapshot.frame.report.times.*member; s > 0.0)
         text_line(fmt::format("{:<9}{:7.1f} ms", name, 1e3 * s));
     const PictureReport& r = snapshot.frame.report;
-    text_line(fmt::format("{:.2f} M camera rays, {:.2f} M occlusion rays", 1e-6 * static_cast<double>(r.primary_rays),
+    text_line(fmt::format("{:.2f} M camera, {:.2f} M occlusion rays", 1e-6 * static_cast<double>(r.primary_rays),
                           1e-6 * static_cast<double>(r.ao_rays)));
     text_line(fmt::format("history {:.1f} frames, {} x {} traced", r.mean_history, snapshot.frame.traced.width,
                           snapshot.frame.traced.height));
@@ -223,7 +282,7 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({kMargin, kMargin}, ImGuiCond_Always);
   ImGui::SetNextWindowSizeConstraints({kPanelWidth, 0.0f}, {kPanelWidth, screen.y * 0.8f});
-  ImGui::SetNextWindowBgAlpha(0.75f);
+  ImGui::SetNextWindowBgAlpha(kAlpha);
   if (ImGui::Begin("View", nullptr, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings)) {
     draw_pane(0, shown, frames);
     draw_split(shown, frames);
@@ -238,8 +297,9 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
       settings_pane_ = 0;
     }
     draw_settings(shown.settings[settings_pane_], settings_pane_, frames);
+    draw_contents(shown, frames);
     auto target = static_cast<float>(shown.target_ms);
-    ImGui::SetNextItemWidth(120.0f);
+    ImGui::SetNextItemWidth(kWidgetWidth);
     if (ImGui::SliderFloat("target, ms", &target, 0.0f, 200.0f, "%.0f", ImGuiSliderFlags_AlwaysClamp))
       frames.post([target](ViewSession& session, ViewControls&) { session.set_target_ms(double{target}); });
     tooltip("Milliseconds that a frame may take while something moves: above, its resolution falls. 0: no limit");
@@ -248,9 +308,22 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
     if (ImGui::Button("Save settings")) frames.post(actions.save_settings);
     ImGui::SameLine();
     if (ImGui::Button("Help (H)")) help = !help;
-    text_line(fmt::format("speed {:.3g} per second{}{}{}", shown.speed, shown.orbits ? ", orbit" : "",
+    text_line(fmt::format("speed {:.3g} units per second{}{}{}", shown.speed, shown.orbits ? ", orbit" : "",
                           shown.plays ? ", plays" : "", shown.paused ? ", paused" : ""));
     if (shown.recording) ImGui::TextColored({1.0f, 0.4f, 0.3f, 1.0f}, "recording the camera");
+  }
+  ImGui::End();
+}
+
+void draw_loading(const std::string& file, const std::pair<std::string, double>& loading) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x / 2.0f, screen.y / 2.0f}, ImGuiCond_Always, {0.5f, 0.5f});
+  if (ImGui::Begin("##loading", nullptr,
+                   ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
+                       ImGuiWindowFlags_AlwaysAutoResize)) {
+    ImGui::TextUnformatted(("loading " + file).c_str());
+    ImGui::ProgressBar(static_cast<float>(loading.second), {std::clamp(screen.x / 2.0f, 1.0f, 320.0f), 0.0f}, "");
+    ImGui::TextUnformatted(loading.first.empty() ? "rendering the first frame" : loading.first.c_str());
   }
   ImGui::End();
 }

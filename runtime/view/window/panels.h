@@ -2,12 +2,17 @@
 
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/view/frame_thread.h"
 #include "runtime/view/window/window.h"
 
 namespace packtrace {
+
+/// What the window shows before the first frame.
+/// @param loading FrameThread::loading()
+void draw_loading(const std::string& file, const std::pair<std::string, double>& loading);
 
 /// The panels over the picture: views and settings, times, pick, help.
 class Panels {

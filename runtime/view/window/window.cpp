@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
+#include <vector>
 
 // In this order: GLFW must not include OpenGL's header before its own choice.
 #include <backends/imgui_impl_glfw.h>
@@ -87,20 +88,6 @@ ImageSize framebuffer_size(GLFWwindow* window) {
   return {static_cast<uint32_t>(std::max(width, 1)), static_cast<uint32_t>(std::max(height, 1))};
 }
 
-/// What the window shows before the first frame.
-void draw_loading(const std::string& file, const std::pair<std::string, double>& loading) {
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({screen.x / 2.0f, screen.y / 2.0f}, ImGuiCond_Always, {0.5f, 0.5f});
-  if (ImGui::Begin("##loading", nullptr,
-                   ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
-                       ImGuiWindowFlags_AlwaysAutoResize)) {
-    ImGui::TextUnformatted(("loading " + file).c_str());
-    ImGui::ProgressBar(static_cast<float>(loading.second), {std::clamp(screen.x / 2.0f, 1.0f, 320.0f), 0.0f},
-                       loading.first.c_str());
-  }
-  ImGui::End();
-}
-
 } // namespace
 
 struct ViewerWindow::State {
@@ -112,7 +99,13 @@ struct ViewerWindow::State {
   const WindowActions* actions = nullptr;
   std::shared_ptr<const ViewSnapshot> shown;
   ImageSize size;
-  // The mouse.
+  // Keys and mouse, which wait until the panels know where the mouse is.
+  struct InputEvent {
+    enum class Kind : uint8_t { kKey, kButton, kMouse } kind = Kind::kMouse;
+    int code = 0, action = 0, mods = 0;
+    double x = 0, y = 0, time_s = 0;
+  };
+  std::vector<InputEvent> input;
   std::optional<MouseButton> dragged;
   bool moves_divider = false;
   double mouse_x = 0, mouse_y = 0, pressed_x = 0, pressed_y = 0, gone = 0, clicked_s = -1;
@@ -120,9 +113,10 @@ struct ViewerWindow::State {
 
   void key(int code, int action, int mods);
   void request(ViewRequest asked);
-  void button(int code, int action);
+  void button(int code, int action, double time_s);
   void mouse(double x, double y);
-  void click();
+  void handle_input();
+  void click(double time_s);
   void toggle_full_screen();
   void follow_size();
   void take_snapshot();
@@ -183,12 +177,11 @@ std::optional<std::array<uint32_t, 2>> ViewerWindow::State::pixel() const {
   return std::array{x, y};
 }
 
-void ViewerWindow::State::click() {
+void ViewerWindow::State::click(double time_s) {
   const auto at = pixel();
   if (!at) return;
-  const double now = glfwGetTime();
-  const bool twice = now - clicked_s < kDoubleClickSeconds;
-  clicked_s = twice ? -1.0 : now;
+  const bool twice = time_s - clicked_s < kDoubleClickSeconds;
+  clicked_s = twice ? -1.0 : time_s;
   frames->post_reading([at, twice, picked = actions->picked](ViewSession& session, ViewControls&) {
     if (twice)
       session.set_pivot((*at)[0], (*at)[1]);
@@ -199,12 +192,12 @@ void ViewerWindow::State::click() {
   });
 }
 
-void ViewerWindow::State::button(int code, int action) {
+void ViewerWindow::State::button(int code, int action, double time_s) {
   if (action == GLFW_RELEASE) {
     const bool clicked = dragged == MouseButton::kLeft && !moves_divider && gone < kClickPixels;
     dragged.reset();
     moves_divider = false;
-    if (clicked) click();
+    if (clicked) click(time_s);
     return;
   }
   if (panels.any() && ImGui::GetIO().WantCaptureMouse) return;
@@ -236,6 +229,21 @@ void ViewerWindow::State::mouse(double x, double y) {
   frames->post(
       [b = *dragged, step_x, step_y](ViewSession&, ViewControls& controls) { controls.drag(b, step_x, step_y); },
       FrameThread::Urgency::kMoves);
+}
+
+void ViewerWindow::State::handle_input() {
+  for (const InputEvent& event : input) switch (event.kind) {
+    case InputEvent::Kind::kKey:
+      key(event.code, event.action, event.mods);
+      break;
+    case InputEvent::Kind::kButton:
+      button(event.code, event.action, event.time_s);
+      break;
+    case InputEvent::Kind::kMouse:
+      mouse(event.x, event.y);
+      break;
+    }
+  input.clear();
 }
 
 void ViewerWindow::State::toggle_full_screen() {
@@ -279,6 +287,7 @@ void ViewerWindow::State::draw() {
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
+  handle_input();
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   if (shown) {
     ImDrawList* const back = ImGui::GetBackgroundDrawList();
@@ -332,10 +341,15 @@ ViewerWindow::ViewerWindow(ImageSize size, std::string device, const std::string
   glfwMakeContextCurrent(window);
   glfwSwapInterval(1);
   glfwSetWindowUserPointer(window, state_.get());
-  glfwSetKeyCallback(window,
-                     [](GLFWwindow* w, int key, int, int action, int mods) { state_of(w).key(key, action, mods); });
-  glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int b, int action, int) { state_of(w).button(b, action); });
-  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { state_of(w).mouse(x, y); });
+  glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
+    state_of(w).input.push_back({State::InputEvent::Kind::kKey, key, action, mods, 0, 0, 0});
+  });
+  glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int b, int action, int) {
+    state_of(w).input.push_back({State::InputEvent::Kind::kButton, b, action, 0, 0, 0, glfwGetTime()});
+  });
+  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+    state_of(w).input.push_back({State::InputEvent::Kind::kMouse, 0, 0, 0, x, y, 0});
+  });
   glfwSetScrollCallback(window, [](GLFWwindow* w, double, double y) {
     if (!state_of(w).panels.any() || !ImGui::GetIO().WantCaptureMouse)
       state_of(w).frames->post([y](ViewSession&, ViewControls& controls) { controls.wheel(y); });

@@ -213,6 +213,18 @@ TEST(ViewSession, SettlingRendersWhatChanged) {
   EXPECT_EQ(session.last().still_frames, 1u);
 }
 
+TEST(ViewSession, TellsWhatTheFileConsistsOf) {
+  const ViewBench bench;
+  ViewSession session = bench.session();
+  EXPECT_THROW(session.contents(0), Error) << "nothing is traced yet";
+  test::step(session, 1);
+  const FileContents contents = session.contents(1);
+  EXPECT_TRUE(contents.streams.empty()) << "floats have no streams";
+  EXPECT_TRUE(contents.plan.empty());
+  ASSERT_FALSE(contents.resident.empty());
+  for (const auto& [name, bytes] : contents.resident) EXPECT_GT(bytes, 0u) << name;
+}
+
 TEST(ViewSession, AnyWindowSizeWorks) {
   const ViewBench bench;
   ViewSession session = bench.session();
