@@ -19,7 +19,7 @@ WeightedMean mean_of_neighbours(const FilterInput& input, size_t step, int x, in
       if (!(h.samples.row(y + dy)[x + dx] > 0.0f)) continue;
       const uint8_t weight =
           side > 0 ? *input.pair_guides.row(step, x, y)[d] : *input.pair_guides.row(step, x + dx, y + dy)[d];
-      if (weight > kMinGuide) mean.add(static_cast<float>(weight), h.mean.row(y + dy)[x + dx]);
+      if (weight > kLoneGuide) mean.add(static_cast<float>(weight), h.mean.row(y + dy)[x + dx]);
     }
   return mean;
 }

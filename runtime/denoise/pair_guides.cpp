@@ -7,19 +7,76 @@
 namespace packtrace {
 namespace {
 
-constexpr int kKept = 8; ///< rows of derivatives; more than the largest step
-
-/// Derivatives of the last rows.
-class DerivedRows {
+/// Rows that a thread keeps, padded with zeros.
+template <typename T>
+class KeptRows {
 public:
-  explicit DerivedRows(uint32_t width)
-      : stride_(static_cast<size_t>(width) + 2 * kRowPadding), data_(2 * kKept * stride_) {}
-  float* dx(int y) { return data_.data() + static_cast<size_t>(y & (kKept - 1)) * 2 * stride_ + kRowPadding; }
-  float* dy(int y) { return dx(y) + stride_; }
+  explicit KeptRows(uint32_t width)
+      : stride_(static_cast<size_t>(width) + 2 * kRowPadding), data_((kKept + 1) * stride_) {}
+  T* row(int y) { return data_.data() + static_cast<size_t>(y & (kKept - 1)) * stride_ + kRowPadding; }
+  const T* zeros() const { return data_.data() + kKept * stride_ + kRowPadding; }
 
 private:
+  static constexpr size_t kKept = 8; ///< more than the largest step and the rows above and below
   size_t stride_;
-  std::vector<float> data_;
+  std::vector<T> data_;
+};
+
+/// Guide weights of consecutive rows, as one thread computes them.
+class GuideRows {
+public:
+  GuideRows(const Guides& guides, const GuideTerms& terms, const FilterKernels& kernels)
+      : guides_(guides), terms_(terms), kernels_(kernels), width_(static_cast<int>(guides.size.width)),
+        height_(static_cast<int>(guides.size.height)), dx_(guides.size.width), dy_(guides.size.width),
+        lone_(guides.size.width), near_{KeptRows<uint8_t>(guides.size.width), KeptRows<uint8_t>(guides.size.width),
+                                        KeptRows<uint8_t>(guides.size.width), KeptRows<uint8_t>(guides.size.width)} {}
+
+  /// Starts anew at row y.
+  void begin(int y) { next_derived_ = next_near_ = std::max(y - 1, 0), next_lone_ = y; }
+
+  /// Computes the weights of a row; rows come in ascending order.
+  void write(int y, size_t step_index, const std::array<uint8_t*, 4>& weights) {
+    const int step = PairGuides::kSteps[step_index];
+    for (; next_lone_ <= std::min(y + PairGuides::kSteps.back(), height_ - 1); ++next_lone_) find_lone(next_lone_);
+    if (step == 1)
+      for (size_t d = 0; d < weights.size(); ++d) std::copy_n(near_[d].row(y), width_, weights[d]);
+    else
+      kernels_.guide(width_, step, surface(y), surface(y + step), terms_, weights);
+    kernels_.raise_guides(width_, step, lone_.row(y), y + step < height_ ? lone_.row(y + step) : lone_.zeros(),
+                          weights);
+  }
+
+private:
+  SurfaceRow surface(int y) {
+    return {guides_.disparity.row(y), dx_.row(y), dy_.row(y), guides_.normal_x.row(y), guides_.normal_y.row(y),
+            guides_.normal_z.row(y)};
+  }
+
+  void find_lone(int y) {
+    for (; next_near_ <= y; ++next_near_) {
+      for (; next_derived_ <= std::min(next_near_ + 1, height_ - 1); ++next_derived_)
+        derive_row(width_, guides_.disparity.row(next_derived_ - 1), guides_.disparity.row(next_derived_),
+                   guides_.disparity.row(next_derived_ + 1), dx_.row(next_derived_), dy_.row(next_derived_));
+      kernels_.guide(
+          width_, 1, surface(next_near_), surface(next_near_ + 1), terms_,
+          {near_[0].row(next_near_), near_[1].row(next_near_), near_[2].row(next_near_), near_[3].row(next_near_)});
+    }
+    const auto pairs = [&](int row) {
+      PairRow rows;
+      for (size_t d = 0; d < rows.size(); ++d) rows[d] = row >= 0 ? near_[d].row(row) : near_[d].zeros();
+      return rows;
+    };
+    kernels_.lone_guide(width_, pairs(y), pairs(y - 1), guides_.disparity.row(y), lone_.row(y));
+  }
+
+  const Guides& guides_;
+  const GuideTerms terms_;
+  const FilterKernels& kernels_;
+  int width_, height_;
+  int next_derived_ = 0, next_near_ = 0, next_lone_ = 0;
+  KeptRows<float> dx_, dy_; ///< derivatives of the disparity
+  KeptRows<uint8_t> lone_;
+  std::array<KeptRows<uint8_t>, 4> near_; ///< weights of the pairs one pixel apart, not raised
 };
 
 } // namespace
@@ -30,25 +87,16 @@ void PairGuides::resize(ImageSize size) {
 }
 
 void PairGuides::compute(const Guides& guides, const FluxConfig& config, const FilterKernels& kernels) {
-  const int width = static_cast<int>(guides.size.width), height = static_cast<int>(guides.size.height);
-  tbb::enumerable_thread_specific<DerivedRows> derived(guides.size.width);
+  tbb::enumerable_thread_specific<GuideRows> threads(guides, GuideTerms{config.guide_depth, config.guide_slope},
+                                                     kernels);
   for_row_blocks(guides.size.height, [&](int first, int last) {
-    DerivedRows& rows = derived.local();
-    const auto surface = [&](int y) {
-      return SurfaceRow{guides.disparity.row(y), rows.dx(y), rows.dy(y), guides.normal_x.row(y), guides.normal_y.row(y),
-                        guides.normal_z.row(y)};
-    };
-    int next = first;
-    for (int y = first; y < last; ++y) {
-      for (; next <= std::min(y + kSteps.back(), height - 1); ++next)
-        derive_row(width, guides.disparity.row(next - 1), guides.disparity.row(next), guides.disparity.row(next + 1),
-                   rows.dx(next), rows.dy(next));
+    GuideRows& rows = threads.local();
+    rows.begin(first);
+    for (int y = first; y < last; ++y)
       for (size_t i = 0; i < kSteps.size(); ++i) {
         Step& s = steps_[i];
-        kernels.guide(width, kSteps[i], surface(y), surface(y + kSteps[i]), {config.guide_depth, config.guide_slope},
-                      {s[0].row(y), s[1].row(y), s[2].row(y), s[3].row(y)});
+        rows.write(y, i, {s[0].row(y), s[1].row(y), s[2].row(y), s[3].row(y)});
       }
-    }
   });
 }
 

@@ -35,6 +35,12 @@ struct SurfaceRow {
 /// Least guide weight, of 255, of two pixels that both hit something.
 inline constexpr uint8_t kMinGuide = 3;
 
+/// Least guide weight of two pixels without any neighbour on their surfaces, as in foliage: there is no edge to keep
+/// there, and the noise of few samples is larger than the differences of neighbours.
+inline constexpr uint8_t kLoneGuide = 17;
+/// Sum of the guide weights of a pixel's eight neighbours from which on it is not alone.
+inline constexpr int kCompany = 3 * 255;
+
 struct GuideTerms {
   float depth, slope;
 };
@@ -119,6 +125,13 @@ struct FilterKernels {
   /// @param below the row one step below
   void (*guide)(int width, int step, const SurfaceRow& here, const SurfaceRow& below, const GuideTerms& terms,
                 const std::array<uint8_t*, 4>& weights);
+  /// How alone the pixels of a row are, from the guide weights of the pairs one pixel apart that begin in it and in the
+  /// row above: 0 to kLoneGuide. 0 for pixels that missed.
+  void (*lone_guide)(int width, const PairRow& here, const PairRow& above, const float* disparity, uint8_t* lone);
+  /// Raises the guide weights of the pairs that begin in a row to the lesser lone_guide() of both pixels.
+  /// @param below the row one step below
+  void (*raise_guides)(int width, int step, const uint8_t* here, const uint8_t* below,
+                       const std::array<uint8_t*, 4>& weights);
   /// Distances d of the pairs that begin in a row, plus 1 / noise_tolerance; kNoDistance where a pixel missed.
   /// @param below the row one step below
   /// @param no_distance PatchTerms::no_distance

@@ -59,6 +59,35 @@ void guide_row(int width, int step, const SurfaceRow& here, const SurfaceRow& be
   }
 }
 
+void lone_guide_row(int width, const PairRow& here, const PairRow& above, const float* disparity,
+                    uint8_t* __restrict lone) {
+  const PairRow h = here, a = above;
+  for (int x = 0; x < width; ++x) {
+    const int company =
+        h[0][x] + h[0][x - 1] + h[1][x] + a[1][x] + h[2][x] + a[2][x - 1] + h[3][x] + a[3][x + 1]; // all eight pairs
+    const int missing = company < kCompany ? kCompany - company : 0;
+    constexpr int kGain = 65536 * kLoneGuide / kCompany + 1; // rounded up, so that kLoneGuide is reached
+    lone[x] = static_cast<uint8_t>(disparity[x] > 0.0f ? (missing * kGain) >> 16 : 0);
+  }
+}
+
+inline uint8_t raised(uint8_t weight, uint8_t p, uint8_t q) {
+  const uint8_t least = p < q ? p : q;
+  return weight < least ? least : weight;
+}
+
+void raise_guides_row(int width, int step, const uint8_t* here, const uint8_t* below,
+                      const std::array<uint8_t*, 4>& weights) {
+  uint8_t *right = weights[0], *down = weights[1], *down_right = weights[2], *down_left = weights[3];
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    right[x] = raised(right[x], here[x], here[x + step]);
+    down[x] = raised(down[x], here[x], below[x]);
+    down_right[x] = raised(down_right[x], here[x], below[x + step]);
+    down_left[x] = raised(down_left[x], here[x], below[x - step]);
+  }
+}
+
 /// 1 / sqrt(v_p + v_q) from 1 / sqrt(2 v) of both: an approximation to within 5 % without a division.
 inline U16 precision_of_pair(U16 p, U16 q) {
   const U16 least = lesser(p, q), most = greater(p, q);
@@ -304,9 +333,10 @@ void finish_row(int width, const int16_t* value, const float* mean, const float*
   }
 }
 
-constexpr FilterKernels kKernels = {guide_row,           compare_row,         weigh_row,          normalise_row,
-                                    normalise_first_row, exchange_row<false>, exchange_row<true>, moments_row,
-                                    sum_along_row,       variance_row,        any_to_fill,        finish_row};
+constexpr FilterKernels kKernels = {guide_row,          lone_guide_row, raise_guides_row,    compare_row,
+                                    weigh_row,          normalise_row,  normalise_first_row, exchange_row<false>,
+                                    exchange_row<true>, moments_row,    sum_along_row,       variance_row,
+                                    any_to_fill,        finish_row};
 
 } // namespace
 } // namespace packtrace

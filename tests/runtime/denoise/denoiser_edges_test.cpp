@@ -105,5 +105,43 @@ TEST(DenoiserEdges, ContactShadowsOnOneSurfaceStaySharpOnceSampled) {
   EXPECT_NEAR(mean_of(result->ao, kSize, {kEdge, 0, kEdge + 1, kSize.height}), expected(right), 0.01);
 }
 
+/// Every pixel shows another leaf.
+GBuffer foliage(ImageSize size) {
+  GBuffer g = wall(size);
+  for (uint32_t i = 0; i < size.pixels(); ++i) {
+    g.view_z[i] = 5.0f + 45.0f * uniform(i, 1, 0);
+    g.normal[i] = glm::normalize(Vec3(uniform(i, 2, 0) - 0.5f, uniform(i, 3, 0) - 0.5f, -0.3f));
+  }
+  return g;
+}
+
+TEST(AoDenoiser, LeavesWithoutNeighboursOnTheirSurfacesAreAveraged) {
+  const ImageSize size{96, 64};
+  AoDenoiser still, moving;
+  const auto error = [&](const DenoisedAo& result) {
+    return rmse_of(result.ao, size, all(size), [](uint32_t, uint32_t) { return expected(0.5f); });
+  };
+  EXPECT_LT(error(still.next_frame(foliage(size), noise(size, 0.5f, 0))), 0.4 * 0.375);
+  GBuffer g = foliage(size);
+  for (Vec2& motion : g.motion_px) motion = Vec2(200.0f, 0.0f); // all came into view
+  moving.add_frame(foliage(size), noise(size, 0.5f, 0));
+  EXPECT_LT(error(moving.next_frame(g, noise(size, 0.5f, 1))), 0.4 * 0.375);
+}
+
+TEST(AoDenoiser, WiresOnePixelWideDoNotMixWithTheWallBehind) {
+  const ImageSize size{64, 48};
+  const auto is_wire = [](uint32_t x, uint32_t y) { return x == 20 || (x > 30 && y == 24) || (x == y + 40); };
+  GBuffer g = wall(size);
+  const auto truth = [&](uint32_t x, uint32_t y) { return is_wire(x, y) ? 0.3f : 0.8f; };
+  for (uint32_t y = 0; y < size.height; ++y)
+    for (uint32_t x = 0; x < size.width; ++x)
+      if (is_wire(x, y)) g.view_z[size_t{y} * size.width + x] = 4.0f;
+  AoDenoiser denoiser;
+  const DenoisedAo& result = denoiser.next_frame(g, samples(size, truth));
+  for (uint32_t y = 2; y < size.height - 2; ++y) // corners of the wall that a wire cuts off are alone
+    for (uint32_t x = 2; x < size.width - 2; ++x)
+      EXPECT_NEAR(result.ao[size_t{y} * size.width + x], truth(x, y), 0.03f) << x << " " << y;
+}
+
 } // namespace
 } // namespace packtrace
