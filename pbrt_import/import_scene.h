@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,9 @@
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
+
+/// The axis that points upwards in a mesh file.
+enum class UpAxis : uint8_t { kX, kY, kZ };
 
 struct ImportOptions {
   bool strict = false;                          ///< any warning or error fails the import, after all are reported
@@ -30,7 +34,9 @@ struct ImportOptions {
   /// Number of the world (WorldBegin ... WorldEnd with its options) to read, from 1. Unset: the first, with a warning
   /// if there are more.
   std::optional<uint32_t> world;
-  std::optional<double> time; ///< time at which animations are evaluated; unset: shutter opening of the camera
+  std::optional<double> time;  ///< time at which animations are evaluated; unset: shutter opening of the camera
+  double mesh_scale = 1.0;     ///< factor of the coordinates of mesh files, within [1e-30, 1e30]
+  UpAxis mesh_up = UpAxis::kY; ///< up axis of mesh files; scenes have y
 };
 
 /// Statistics of an import, for reports.
@@ -63,9 +69,9 @@ struct ImportResult {
   MemoryReservation memory;                 ///< reservation for the scene; must live as long as the scene
 };
 
-/// Reads a pbrt-v3 scene with all files that it includes. Problems are reported to diagnostics with their source
-/// location, and the rest of the scene is kept; a scene without any shape is returned as such. The result and the
-/// diagnostics depend on the files only, not on the number of threads.
+/// Reads a pbrt-v3 scene with all files that it includes, or a mesh file (see import_mesh_files()). Problems are
+/// reported to diagnostics with their source location, and the rest of the scene is kept; a scene without any shape is
+/// returned as such. The result and the diagnostics depend on the files only, not on the number of threads.
 ///
 /// If there are several worlds, one is read together with the options before it, as if it were alone. The text of the
 /// others is checked, but of the files that they name only included ones are opened. Everything animated is placed at
@@ -79,5 +85,12 @@ struct ImportResult {
 /// the scene needs more than options.memory; Error(kCancelled) on cancellation.
 ImportResult import_scene(const std::filesystem::path& main_file, const ImportOptions& options,
                           Diagnostics& diagnostics, Progress& progress);
+
+/// Reads PLY, OBJ and STL files as one scene, which has no cameras. Their right-handed coordinates become the scene's
+/// left-handed ones by mirroring x; options.mesh_scale and mesh_up apply.
+/// @param files at least one; the formats are recognised by scene_format()
+/// Throws like import_scene(); Error(kUsage) if there is a pbrt scene among several files.
+ImportResult import_mesh_files(std::span<const std::filesystem::path> files, const ImportOptions& options,
+                               Diagnostics& diagnostics, Progress& progress);
 
 } // namespace packtrace

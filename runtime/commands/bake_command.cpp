@@ -70,6 +70,8 @@ void add_motion_of(const BakeOptions& options, const GlobalOptions& globals, Sce
 
 int run(const BakeOptions& given, const GlobalOptions& globals) {
   BakeOptions options = given;
+  options.input = options.inputs.front();
+  options.scene.joined_files.assign(options.inputs.begin() + 1, options.inputs.end());
   apply_preset(options);
   BakeConfig config = make_config(options);
   if (options.output.empty() && !options.dry_run) fail_without_output("bake", options.input, ".ptk");
@@ -137,7 +139,7 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
 
 void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<BakeOptions>();
-  CLI::App& verb = add_verb(app, globals, "bake", "Convert a pbrt-v3 scene into a compact .ptk file",
+  CLI::App& verb = add_verb(app, globals, "bake", "Convert a pbrt-v3 scene or mesh files into a compact .ptk file",
                             [options, &globals] { return run(*options, globals); });
   add_bake_options(verb, *options);
 }

@@ -199,7 +199,9 @@ void add_sequence_options(CLI::App& verb, BakeOptions& options) {
 } // namespace
 
 void add_bake_options(CLI::App& verb, BakeOptions& options) {
-  verb.add_option("SCENE", options.input, "pbrt-v3 scene file")->required();
+  verb.add_option("SCENE", options.inputs,
+                  "pbrt-v3 scene, or one or more .ply, .obj or .stl files, which make one scene")
+      ->required();
   add_output_option(verb, options.output,
                     "Output file (.ptk), or - for standard output. Required unless --dry-run is given");
   add_precision_options(verb, options.config);
@@ -234,6 +236,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
               "reason; -v lists it per geometry.\n"
               "Examples:\n"
               "  packtrace bake house.pbrt -o house.ptk\n"
+              "  packtrace bake scan.ply stand.obj -o both.ptk --up z\n"
               "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
               "  packtrace bake meadow.pbrt -o meadow.ptk --sequence 'grass_%04d.ply' --sequence-fps 30\n"
               "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"

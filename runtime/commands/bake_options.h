@@ -16,7 +16,8 @@ inline constexpr std::array<const char*, 3> kPresets{"smallest", "balanced", "ex
 
 /// The options of `bake`.
 struct BakeOptions {
-  std::string input, output;
+  std::vector<std::string> inputs;    ///< a pbrt scene, or mesh files that make one
+  std::string input, output;          ///< input: the first of `inputs`
   BakeConfig config;                  ///< its precision; make_config() adds the rest
   std::optional<std::string> normals; ///< auto unless set
   std::optional<double> normal_error;

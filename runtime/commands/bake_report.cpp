@@ -63,6 +63,7 @@ nlohmann::json bake_json(const BakeOptions& options, const BakeReport& baked, co
   nlohmann::json json = to_json(baked.file, by_geometry);
   json["verb"] = "bake";
   json["input"] = options.input;
+  if (options.inputs.size() > 1) json["inputs"] = options.inputs;
   json["output"] = options.dry_run ? nlohmann::json() : nlohmann::json(options.output);
   json["seconds"] = {{"import", timings.import_s}, {"bake", timings.bake_s}};
   json["peak_rss_bytes"] = peak_rss_bytes();

@@ -90,9 +90,9 @@ RunnerConfig runner_config(const BakeOptions& options, const GlobalOptions& glob
   config.scene = options.input;
   config.common = {"--max-memory", std::to_string(globals.memory.limit())};
   if (globals.threads > 0) config.common.insert(config.common.end(), {"--threads", std::to_string(globals.threads)});
-  if (options.scene.world) config.scene_options = {"--world", std::to_string(*options.scene.world)};
-  if (options.scene.time)
-    config.scene_options.insert(config.scene_options.end(), {"--time", number_text(*options.scene.time)});
+  SceneOptions scene = options.scene;
+  scene.strict = false; // the bake itself reports problems
+  config.scene_options = scene_words(scene);
   config.bake_options = further_options(options);
   config.size = {320, 180};
   config.camera = options.camera;
@@ -139,6 +139,9 @@ nlohmann::json summary_of(const TargetResult& result, const TargetSearch& search
 } // namespace
 
 nlohmann::json find_target(BakeOptions& options, const GlobalOptions& globals) {
+  if (!options.scene.joined_files.empty())
+    throw Error(ErrorKind::kUsage,
+                "--target measures one file; join the others in a .pbrt scene with Shape \"plymesh\"");
   const TargetSearch search = search_of(options);
   const WorkFolder work;
   const MeasureFolder folder(work.path(), {{"scene", options.input}}, false);

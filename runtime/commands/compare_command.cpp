@@ -17,6 +17,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/output_file.h"
+#include "pbrt_import/scene_format.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/geometry_compare.h"
 #include "runtime/commands/json_output.h"
@@ -224,11 +225,14 @@ void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
 }
 
 int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
-  const std::string ending = ending_of(options.test), other = ending_of(options.reference);
-  if (ending == ".ptk" || ending == ".pbrt" || other == ".ptk" || other == ".pbrt")
+  const auto is_scene = [](const std::string& file) {
+    const std::string ending = ending_of(file);
+    return ending == ".ptk" || ending == ".pbrt" || scene_format(file) != SceneFormat::kPbrt;
+  };
+  if (is_scene(options.test) || is_scene(options.reference))
     return compare_geometry(options.test, options.reference, options.samples, options.scene, globals);
-  if (options.scene.strict || options.scene.world || options.scene.time)
-    throw Error(ErrorKind::kUsage, "--strict, --world and --time only apply to a .pbrt scene");
+  if (const std::vector<std::string> words = scene_words(options.scene); !words.empty())
+    throw Error(ErrorKind::kUsage, words[0] + " only applies to scenes and mesh files");
   if (!options.diff.empty() && ending_of(options.diff) != ".png")
     throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the file name must end in .png");
   JsonOutput json(globals.json, globals.force);

@@ -238,10 +238,11 @@ int run_several(const InfoOptions& options, const GlobalOptions& globals) {
 
 void add_info_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App& verb = add_verb(
-      app, globals, "info", "Show contents, sizes and errors of .ptk files and .pbrt scenes", [options, &globals] {
-        return options->inputs.size() == 1 ? run_one(*options, globals) : run_several(*options, globals);
-      });
+  CLI::App& verb =
+      add_verb(app, globals, "info", "Show contents, sizes and errors of .ptk files, .pbrt scenes and meshes",
+               [options, &globals] {
+                 return options->inputs.size() == 1 ? run_one(*options, globals) : run_several(*options, globals);
+               });
   verb.add_option("FILE", options->inputs,
                   "One or more .ptk files or .pbrt scenes. For several files a table with one row per file is printed; "
                   "-v prints each in full")

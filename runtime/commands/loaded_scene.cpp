@@ -17,8 +17,10 @@
 #include "pbrt_import/base/regular_file.h"
 #include "pbrt_import/base/with_file.h"
 #include "pbrt_import/scene/separate_motion.h"
+#include "pbrt_import/scene_format.h"
 #include "pbrt_import/text/input_file.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/measure/knobs.h"
 #include "runtime/trace/source/float_source.h"
 #include "runtime/trace/source/packed_source.h"
 
@@ -42,7 +44,7 @@ MemoryReservation reserve_decoded(const std::filesystem::path& file, const Memor
 }
 
 void add_scene_options(CLI::App& verb, SceneOptions& options) {
-  constexpr const char* kGroup = "Options for .pbrt scenes";
+  constexpr const char* kGroup = "Options for .pbrt scenes and mesh files";
   verb.add_flag("--strict", options.strict,
                 "Fail if reading the scene reports any warning or error, instead of continuing with the rest")
       ->group(kGroup);
@@ -56,14 +58,40 @@ void add_scene_options(CLI::App& verb, SceneOptions& options) {
                   "which the camera's shutter opens)")
       ->type_name("T")
       ->group(kGroup);
+  constexpr const char* kMeshGroup = "Options for .ply, .obj and .stl files";
+  verb.add_option("--up", options.up, "Axis of the file that points upwards (default y; scenes have y)")
+      ->check(one_of({"x", "y", "z"}))
+      ->group(kMeshGroup);
+  verb.add_option("--scale", options.scale, "Factor of all coordinates (default 1)")
+      ->check(number_in(1e-30, 1e30))
+      ->group(kMeshGroup);
+}
+
+std::vector<std::string> scene_words(const SceneOptions& options) {
+  std::vector<std::string> words;
+  const auto add = [&](const char* name, const std::string& value) { words.insert(words.end(), {name, value}); };
+  if (options.world) add("--world", std::to_string(*options.world));
+  if (options.time) add("--time", number_text(*options.time));
+  if (options.up) add("--up", *options.up);
+  if (options.scale) add("--scale", number_text(*options.scale));
+  if (options.strict) words.emplace_back("--strict");
+  return words;
+}
+
+const char* option_without_use(const std::filesystem::path& file, const SceneOptions& options) {
+  const bool baked = is_baked_file(file), mesh = !baked && scene_format(file) != SceneFormat::kPbrt;
+  if (baked || mesh) {
+    if (options.time) return "--time";
+    if (options.world.value_or(1) != 1) return "--world";
+  }
+  if (!mesh) return options.up ? "--up" : options.scale ? "--scale" : nullptr;
+  return nullptr;
 }
 
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options) {
-  const char* const option = options.time ? "--time" : options.world.value_or(1) != 1 ? "--world" : nullptr;
-  if (option)
+  if (const char* const option = option_without_use(file, options))
     throw FileError(ErrorKind::kUsage, file,
-                    std::string(option) +
-                        " only applies to .pbrt scenes; the world and the time of a .ptk file were chosen by bake");
+                    std::string(option) + " does not apply to a .ptk file: bake has chosen its world, time, and size");
 }
 
 namespace {
@@ -80,9 +108,6 @@ void require_scene_text(const std::filesystem::path& file) {
   const std::string_view text(start.data(), size);
   if (is_baked_file(file))
     throw FileError(ErrorKind::kInput, file, "already a baked file; use the .pbrt scene it was made from");
-  if (text.starts_with("ply\n") || text.starts_with("ply\r"))
-    throw FileError(ErrorKind::kInput, file,
-                    "a PLY mesh, not a scene; refer to it from a .pbrt file with Shape \"plymesh\"");
   if (text.find('\0') != std::string::npos)
     throw FileError(ErrorKind::kInput, file, "not a text file, so not a pbrt-v3 scene");
 }
@@ -107,19 +132,33 @@ nlohmann::json problems_json(const ImportStatistics& statistics) {
 ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
                                 const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
                                 bool keep_textures) {
-  require_scene_text(file);
+  const SceneFormat format = scene_format(file);
+  if (format == SceneFormat::kPbrt) require_scene_text(file);
+  if (const char* const option = option_without_use(file, scene_options))
+    throw FileError(ErrorKind::kUsage, file,
+                    std::string(option) + (format == SceneFormat::kPbrt ? " only applies to .ply, .obj and .stl files"
+                                                                        : " only applies to .pbrt scenes"));
   Diagnostics diagnostics;
   ImportOptions options;
   options.strict = scene_options.strict;
   options.world = scene_options.world;
   options.time = scene_options.time;
+  const std::string up = scene_options.up.value_or("y");
+  options.mesh_up = up == "x" ? UpAxis::kX : up == "z" ? UpAxis::kZ : UpAxis::kY;
+  options.mesh_scale = scene_options.scale.value_or(1.0);
   options.keep_textures = keep_textures;
   options.keep_unused_objects = scene_options.keep_unused_objects;
   options.keep_shading = scene_options.keep_shading;
   options.memory = globals.memory;
   ImportResult result;
   try {
-    result = import_scene(file, options, diagnostics, progress);
+    if (scene_options.joined_files.empty()) {
+      result = import_scene(file, options, diagnostics, progress);
+    } else {
+      std::vector<std::filesystem::path> files{file};
+      files.insert(files.end(), scene_options.joined_files.begin(), scene_options.joined_files.end());
+      result = import_mesh_files(files, options, diagnostics, progress);
+    }
   } catch (const Error&) { // earlier diagnostics may explain the error
     display.finish();
     report_diagnostics(diagnostics, globals);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -23,22 +24,32 @@ bool is_baked_file(const std::filesystem::path& file);
 /// cannot be read. Throws MemoryError.
 MemoryReservation reserve_decoded(const std::filesystem::path& file, const MemoryBudget& budget);
 
-/// Options for importing a pbrt scene; see ImportOptions.
+/// Options for importing a scene or mesh file; see ImportOptions.
 struct SceneOptions {
   bool strict = false;
   std::optional<uint32_t> world;
   std::optional<double> time;
-  bool keep_unused_objects = false; ///< as in ImportOptions; no option of its own
-  bool keep_shading = false;        ///< as in ImportOptions; no option of its own
+  std::optional<std::string> up;         ///< axis of mesh files: "x", "y" or "z"
+  std::optional<double> scale;           ///< of mesh files
+  std::vector<std::string> joined_files; ///< further mesh files of the scene; no option of its own
+  bool keep_unused_objects = false;      ///< as in ImportOptions; no option of its own
+  bool keep_shading = false;             ///< as in ImportOptions; no option of its own
 };
 
-/// Adds --strict, --world and --time to a verb. `options` must outlive the verb.
+/// Adds --strict, --world, --time, --up and --scale to a verb. `options` must outlive the verb.
 void add_scene_options(CLI::App& verb, SceneOptions& options);
 
-/// Throws Error(kUsage) if --world or --time is given for a baked file, which holds one world at one time.
+/// The given options as words of a command line.
+std::vector<std::string> scene_words(const SceneOptions& options);
+
+/// Name of the first given option that a file cannot follow: all but --strict for a baked file, --world and --time for
+/// a mesh file, --up and --scale for a pbrt scene; null if there is none.
+const char* option_without_use(const std::filesystem::path& file, const SceneOptions& options);
+
+/// Throws Error(kUsage) if an option chooses what was chosen when a baked file was made.
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options);
 
-/// Imports a pbrt file and prints its diagnostics.
+/// Imports a pbrt or mesh file, with options.joined_files, and prints its diagnostics.
 /// @param keep_textures as in ImportOptions
 /// Throws Error(kInput) if the file cannot be read, does not have the requested world, or has no triangles, or if
 /// strict is set and there was a problem. Throws Error(kUsage) if an output would replace one of the scene's files.

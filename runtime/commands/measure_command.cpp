@@ -122,14 +122,6 @@ Words common_words(const GlobalOptions& globals) {
   return words;
 }
 
-Words scene_words(const SceneOptions& scene) {
-  Words words;
-  if (scene.world) words.insert(words.end(), {"--world", std::to_string(*scene.world)});
-  if (scene.time) words.insert(words.end(), {"--time", number_text(*scene.time)});
-  if (scene.strict) words.emplace_back("--strict");
-  return words;
-}
-
 std::string command_text(const MeasureOptions& options) {
   Words words{"packtrace", "measure", options.input, "-o", options.output};
   if (options.quick) words.emplace_back("--quick");

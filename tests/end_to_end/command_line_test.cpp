@@ -36,18 +36,16 @@ TEST(CommandLine, UnknownOptionIsAUsageErrorThatNamesTheNearestOne) {
   EXPECT_NE(result.err.find("packtrace: error: --suprsample: no such option; did you mean --supersample?"),
             std::string::npos)
       << result.err;
-  EXPECT_NE(run_packtrace({"bake", "x.pbrt", "y.pbrt"}).err.find("y.pbrt: unexpected argument"), std::string::npos);
+  EXPECT_NE(run_packtrace({"export", "x.ptk", "y.ptk"}).err.find("y.ptk: unexpected argument"), std::string::npos);
 }
 
 TEST(CommandLine, OtherFilesThanScenesAreNamedForWhatTheyAre) {
   const Workbench bench;
   ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "-q"}).exit_code, 0);
-  const fs::path mesh = bench.path() / "mesh.ply", binary = bench.path() / "picture.png";
-  std::ofstream(mesh) << "ply\nformat ascii 1.0\n";
+  const fs::path binary = bench.path() / "picture.png";
   std::ofstream(binary) << "\x89PNG" << '\0';
   for (const auto& [file, kind] :
-       {std::pair{bench.baked(), "already a baked file"}, std::pair{mesh.string(), "a PLY mesh"},
-        std::pair{binary.string(), "not a text file"}}) {
+       {std::pair{bench.baked(), "already a baked file"}, std::pair{binary.string(), "not a text file"}}) {
     const CommandResult result = run_packtrace({"bake", file, "-o", (bench.path() / "out.ptk").string()});
     EXPECT_EQ(result.exit_code, 3);
     EXPECT_NE(result.err.find(kind), std::string::npos) << result.err;

@@ -119,11 +119,50 @@ TEST(CompressedScene, WhatIsNoSceneIsRefusedAsIfItWereNotCompressed) {
   const CommandResult zeros = run_packtrace({"bake", bench / "zeros.gz", "-o", bench / "x.ptk"});
   EXPECT_EQ(zeros.exit_code, 3);
   EXPECT_TRUE(contains(zeros.err, "not a text file, so not a pbrt-v3 scene")) << zeros.err;
-  write_text(bench / "mesh.gz", gzip(kPlyText));
-  EXPECT_TRUE(contains(run_packtrace({"info", bench / "mesh.gz"}).err, "a PLY mesh, not a scene"));
   write_text(bench / "cut.gz", without_end(gzip("WorldBegin\n" + kTriangles + "WorldEnd\n"), 9));
   const CommandResult cut = run_packtrace({"info", bench / "cut.gz"});
   EXPECT_TRUE(contains(cut.err, "truncated gzip data; the rest of the file is skipped")) << cut.err;
+}
+
+// Mesh files
+
+TEST(MeshFilesAsScenes, EveryVerbReadsThem) {
+  const Workbench bench;
+  const std::string obj = bench / "a.obj", ply = bench / "b.ply", baked = bench / "both.ptk";
+  write_text(obj, "v 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\n");
+  write_text(ply, kPlyText);
+  const CommandResult bake = run_packtrace({"bake", obj, ply, "-o", baked, "--up", "z", "--scale", "2", "--json", "-"});
+  ASSERT_EQ(bake.exit_code, 0) << bake.err;
+  EXPECT_TRUE(contains(bake.out, "\"inputs\"")) << bake.out;
+  EXPECT_TRUE(contains(run_packtrace({"info", baked}).out, "triangles 2 stored"));
+  EXPECT_TRUE(contains(run_packtrace({"info", obj, "--scale", "3"}).out, "bounds 3 x 3 x 0"));
+  const CommandResult render = run_packtrace({"render", obj, "-o", bench / "x.png", "--frames", "1", "--size", "8x8"});
+  EXPECT_EQ(render.exit_code, 0) << render.err;
+  ASSERT_EQ(run_packtrace({"bake", obj, "-o", bench / "one.ptk", "--scale", "2"}).exit_code, 0);
+  const CommandResult compare = run_packtrace({"compare", bench / "one.ptk", obj, "--scale", "2"});
+  EXPECT_EQ(compare.exit_code, 0) << compare.err;
+}
+
+TEST(MeshFilesAsScenes, OptionsWithoutUseAreRefused) {
+  const Workbench bench;
+  const std::string obj = bench / "a.obj", scene = bench / "a.pbrt", baked = bench / "a.ptk";
+  write_text(obj, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write_text(scene, "WorldBegin\n" + kTriangles + "WorldEnd\n");
+  ASSERT_EQ(run_packtrace({"bake", scene, "-o", baked}).exit_code, 0);
+  for (const auto& [command, problem] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"info", obj, "--world", "2"}, "--world only applies to .pbrt scenes"},
+           {{"info", scene, "--up", "z"}, "--up only applies to .ply, .obj and .stl files"},
+           {{"info", baked, "--scale", "2"}, "--scale does not apply to a .ptk file"},
+           {{"bake", obj, scene, "-o", bench / "x.ptk"}, "only PLY, OBJ and STL files can be joined"},
+           {{"bake", scene, obj, "-o", bench / "x.ptk"}, "only PLY, OBJ and STL files can be joined"},
+           {{"bake", obj, obj, "-o", bench / "x.ptk", "--target", "size=1MB"}, "--target measures one file"}}) {
+    const CommandResult result = run_packtrace(command);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_TRUE(contains(result.err, problem)) << result.err;
+  }
+  const CommandResult missing = run_packtrace({"bake", bench / "none.obj", "-o", bench / "x.ptk"});
+  EXPECT_EQ(missing.exit_code, 3);
+  EXPECT_TRUE(contains(missing.err, "none.obj: ")) << missing.err;
 }
 
 // Names

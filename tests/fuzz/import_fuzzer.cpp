@@ -10,6 +10,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/import_scene.h"
+#include "pbrt_import/scene_format.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scene_contract.h"
 #include "tests/fuzz/scene_files.h"
@@ -50,6 +51,15 @@ std::string outcome(const std::filesystem::path& main_file, const ImportOptions&
   }
 }
 
+/// The file to import: the first with a mesh format's ending, otherwise the main file.
+std::filesystem::path chosen_file(std::string_view text, const std::filesystem::path& main_file) {
+  for (const SceneFile& file : split_scene(text)) {
+    const std::filesystem::path path = main_file.parent_path() / file.name;
+    if (scene_format(path) == SceneFormat::kObj || scene_format(path) == SceneFormat::kStl) return path;
+  }
+  return main_file;
+}
+
 } // namespace
 } // namespace packtrace::fuzz
 
@@ -57,7 +67,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace packtrace::fuzz;
   static SceneFilesFolder folder;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  const std::filesystem::path main_file = folder.write(text);
+  const std::filesystem::path main_file = chosen_file(text, folder.write(text));
   auto options = small_limits();
   const std::string alone = outcome(main_file, options, 1);
   constexpr size_t kRepeatInterval = 16; // these options repeat the import, so each is tried for few inputs only
