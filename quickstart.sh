@@ -21,7 +21,7 @@ run() {
 }
 
 echo "== 1/4 Debian packages"
-run bash .ci/install_packages.sh
+run bash .ci/install_packages.sh window
 echo "== 2/4 Build"
 run cmake --preset tools >/dev/null # without tests, benchmarks and Python, which need more packages
 run cmake --build --preset tools --target packtrace
@@ -39,3 +39,6 @@ echo "  $out/picture.shaded.png   denoised ambient occlusion times albedo"
 echo "  $out/picture.ao.png       the ambient occlusion alone; beside it depth, normals, instances, albedo"
 echo "  $out/layers.exr           all layers in floats"
 echo "  $out/scene.ptk            the baked scene; the table above says what each byte is for"
+echo
+echo "Look at it in a window (H shows the keys):"
+echo "  $packtrace view $out/scene.ptk"

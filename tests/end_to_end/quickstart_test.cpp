@@ -46,6 +46,7 @@ TEST_F(Quickstart, TakesAScenePathFromWhereItIsCalled) {
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
   const std::string scene = fs::canonical(scenes() / "a.pbrt").string();
   EXPECT_NE(result.out.find("packtrace bake <" + scene + ">"), std::string::npos) << result.out;
+  EXPECT_TRUE(result.out.ends_with("\n  build/release/bin/packtrace view build/quickstart/scene.ptk\n")) << result.out;
   EXPECT_EQ(run({(scenes() / "a.pbrt").string()}, "/").exit_code, 0);
   EXPECT_EQ(run({"../my scenes/a.pbrt"}, tree()).exit_code, 0);
 }
