@@ -41,7 +41,8 @@ private:
   FluxConfig config_;
   bool has_frame_ = false;
   bool pair_guides_outdated_ = false; ///< they do not belong to the guides
-  FrameHistory now_, before_;         // `before_` is only used while a frame is denoised
+  /// `before_` is used while a frame is added. Until the next one that moves it is the memory of pair_guides_.
+  FrameHistory now_, before_;
   PairGuides pair_guides_;
   HistoryUpdate update_;
   AoFilter filter_;
@@ -53,7 +54,6 @@ private:
 
 void FluxPipeline::resize(ImageSize size) {
   for (FrameHistory* frame : {&now_, &before_}) frame->guides.resize(size), frame->history.resize(size);
-  pair_guides_.resize(size);
   result_.size = size;
   result_.ao.assign(size.pixels(), kInvalidAo);
   result_.variance.assign(size.pixels(), 0.0f);
@@ -93,7 +93,9 @@ void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistoryS
 
 const DenoisedAo& FluxPipeline::denoise() {
   if (!has_frame_) return result_;
-  if (pair_guides_outdated_) pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()));
+  if (pair_guides_outdated_)
+    pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()),
+                         {before_.guides.disparity, before_.guides.instance, before_.history.trend});
   pair_guides_outdated_ = false;
   filter_.run({now_.guides, pair_guides_, now_.history, moving_, stratified_, samples_},
               {result_.ao, result_.variance, result_.tspp});
@@ -101,7 +103,7 @@ const DenoisedAo& FluxPipeline::denoise() {
 }
 
 size_t FluxPipeline::state_bytes() const {
-  size_t bytes = pair_guides_.bytes();
+  size_t bytes = 0;
   for (const FrameHistory* frame : {&now_, &before_}) bytes += frame->guides.bytes() + frame->history.bytes();
   return bytes;
 }

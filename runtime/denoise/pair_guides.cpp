@@ -81,12 +81,13 @@ private:
 
 } // namespace
 
-void PairGuides::resize(ImageSize size) {
-  for (Step& step : steps_)
-    for (Plane<uint8_t>& plane : step) plane.resize(size);
-}
-
-void PairGuides::compute(const Guides& guides, const FluxConfig& config, const FilterKernels& kernels) {
+void PairGuides::compute(const Guides& guides, const FluxConfig& config, const FilterKernels& kernels,
+                         const Memory& memory) {
+  begin_ = {reinterpret_cast<uint8_t*>(memory.first.row(0)), reinterpret_cast<uint8_t*>(memory.second.row(0)),
+            reinterpret_cast<uint8_t*>(memory.third.row(0))};
+  static_assert(sizeof(*memory.first.row(0)) == kPairOffsets.size());
+  stride_ = memory.first.stride() * static_cast<ptrdiff_t>(kPairOffsets.size());
+  width_ = static_cast<ptrdiff_t>(guides.size.width);
   tbb::enumerable_thread_specific<GuideRows> threads(guides, GuideTerms{config.guide_depth, config.guide_slope},
                                                      kernels);
   for_row_blocks(guides.size.height, [&](int first, int last) {
@@ -94,8 +95,8 @@ void PairGuides::compute(const Guides& guides, const FluxConfig& config, const F
     rows.begin(first);
     for (int y = first; y < last; ++y)
       for (size_t i = 0; i < kSteps.size(); ++i) {
-        Step& s = steps_[i];
-        rows.write(y, i, {s[0].row(y), s[1].row(y), s[2].row(y), s[3].row(y)});
+        uint8_t* const weights = begin_[i] + y * stride_;
+        rows.write(y, i, {weights, weights + width_, weights + 2 * width_, weights + 3 * width_});
       }
   });
 }

@@ -14,21 +14,26 @@ class PairGuides {
 public:
   static constexpr std::array<int, 3> kSteps = {1, 2, 4}; ///< pixels apart
 
-  void resize(ImageSize size);
-  void compute(const Guides& guides, const FluxConfig& config, const FilterKernels& kernels);
+  /// Memory of three planes of 4 bytes a pixel, whose pixels, but not their borders, are overwritten.
+  struct Memory {
+    Plane<float>& first;
+    Plane<uint32_t>&second, &third;
+  };
+
+  /// @param memory of the size of the guides; it must last as long as the weights
+  void compute(const Guides& guides, const FluxConfig& config, const FilterKernels& kernels, const Memory& memory);
 
   /// The weights of the pairs kSteps[step] pixels apart that begin in row y, from pixel x on.
   PairRow row(size_t step, int x, int y) const {
-    const Step& s = steps_[step];
-    return {s[0].row(y) + x, s[1].row(y) + x, s[2].row(y) + x, s[3].row(y) + x};
+    const uint8_t* first = begin_[step] + y * stride_ + x;
+    return {first, first + width_, first + 2 * width_, first + 3 * width_};
   }
   /// From a row to the next one.
-  ptrdiff_t stride() const { return steps_[0][0].stride(); }
-  size_t bytes() const { return kSteps.size() * kPairOffsets.size() * steps_[0][0].bytes(); }
+  ptrdiff_t stride() const { return stride_; }
 
 private:
-  using Step = std::array<Plane<uint8_t>, kPairOffsets.size()>;
-  std::array<Step, kSteps.size()> steps_;
+  std::array<uint8_t*, kSteps.size()> begin_{}; ///< row 0; each row has the weights of the four pairs in turn
+  ptrdiff_t stride_ = 0, width_ = 0;
 };
 
 } // namespace packtrace

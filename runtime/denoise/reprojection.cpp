@@ -16,11 +16,12 @@ ReprojectionRows::ReprojectionRows(ImageSize size, const FluxConfig& config, con
     : config_(config), kernels_(kernels), width_(static_cast<int>(size.width)) {
   const size_t padded = static_cast<size_t>(size.width) + kRunPadding;
   offset_.resize(padded);
-  rows_.resize(9 * padded);
+  rows_.resize(10 * padded);
   float* next = rows_.data();
   const auto row = [&] { return std::exchange(next, next + padded); };
   located_ = {offset_.data(), row(), row(), row(), row(), row()};
   result_ = {row(), row(), row(), row()};
+  weights_ = row();
 }
 
 HistoryRow ReprojectionRows::at(const MotionFrame& frame, int y) {
@@ -62,7 +63,7 @@ HistoryRow ReprojectionRows::at(const MotionFrame& frame, int y) {
         now.normal_z.row(y) + x,
         now.instance.row(y) + x};
     resample(end - x, from, wanted, config_.reprojection_instance_test,
-             {result_.mean + x, result_.square + x, result_.fast + x, result_.samples + x});
+             {result_.mean + x, result_.square + x, result_.fast + x, result_.samples + x}, weights_ + x);
     x = end;
   }
   return result_;

@@ -51,6 +51,7 @@ private:
   std::vector<float> rows_; // of the located and of the resampled pixels
   LocatedRow located_;
   HistoryRow result_;
+  float* weights_; // of rows_, as are those before
 };
 
 } // namespace packtrace

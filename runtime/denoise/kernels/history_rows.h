@@ -103,8 +103,9 @@ struct HistoryKernels {
   /// Resamples the history of `width` pixels that moved by the same offset, by the number of squarings that raise
   /// cosines to their power. Writes up to kRunPadding pixels more.
   /// @param from the previous frame at the first pixel plus its offset
+  /// @param weights scratch
   std::array<void (*)(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
-                      const HistoryRow& out),
+                      const HistoryRow& out, float* weights),
              kMaxNormalSquarings + 1>
       resample;
   /// Adds samples to a row of the history, perhaps in place.

@@ -77,15 +77,19 @@ inline float sharpening(float before, float a, float b, float after, float t) {
   return -0.5f * t * (1.0f - t) * ((1.0f - t) * (before - 2.0f * a + b) + t * (a - 2.0f * b + after));
 }
 
+inline int whole_runs(int width) { return (width + kRunPadding - 1) / kRunPadding * kRunPadding; }
+
+/// Linear interpolation. (With sharpen_run() in one loop, most variables would be in memory.)
+/// @param weights sum of the weights, 0 where the history is rejected
 template <int kSquarings>
-void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
-                  const HistoryRow& out) {
+void interpolate_run(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
+                     const HistoryRow& out, float* __restrict weights) {
   const PreviousPixels p = from;
   const WantedRow w = wanted;
   const HistoryRow o = out;
   const ptrdiff_t s = p.stride;
   const uint32_t ignored = test_instances ? 0u : ~0u; // bits in which instances may differ
-  const int rounded = (width + kRunPadding - 1) / kRunPadding * kRunPadding;
+  const int rounded = whole_runs(width);
 #pragma GCC ivdep
   for (int x = 0; x < rounded; ++x) {
     const float disparity = w.at.disparity[x], tolerance = w.at.tolerance[x];
@@ -114,7 +118,30 @@ void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted
     corner(x + 1, fx * (1.0f - fy));
     corner(x + s, (1.0f - fx) * fy);
     corner(x + s + 1, fx * fy);
-    // The footprint and its eight edge-adjacent neighbours must lie on one surface: a hard test without normals.
+    const bool found = (weight > kMinHistoryWeight) & (disparity > 0.0f);
+    const float scale = found ? 1.0f / weight : 0.0f;
+    weights[x] = found ? weight : 0.0f;
+    o.mean[x] = lesser(mean * scale, 1.0f);
+    o.square[x] = square * scale;
+    o.fast[x] = fast * scale;
+    o.samples[x] = found ? lesser(samples, w.at.longest[x]) : 0.0f;
+  }
+}
+
+/// Bicubic interpolation of the mean, where its footprint and the eight neighbours that share edges with it lie on one
+/// surface: a hard test without normals.
+void sharpen_run(int width, const PreviousPixels& from, const WantedRow& wanted, const HistoryRow& out,
+                 const float* __restrict weights) {
+  const PreviousPixels p = from;
+  const WantedRow w = wanted;
+  const HistoryRow o = out;
+  const ptrdiff_t s = p.stride;
+  const int rounded = whole_runs(width);
+#pragma GCC ivdep
+  for (int x = 0; x < rounded; ++x) {
+    const float disparity = w.at.disparity[x], tolerance = w.at.tolerance[x];
+    const float fx = w.at.fraction_x[x], fy = w.at.fraction_y[x];
+    const uint32_t instance = w.instance[x];
     int same = 1;
     const auto tap = [&](ptrdiff_t at) {
       const bool alike =
@@ -127,16 +154,21 @@ void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted
                           fy * sharpening(tap(x + s - 1), m01, m11, tap(x + s + 2), fx);
     const float along_y = (1.0f - fx) * sharpening(tap(x - s), m00, m01, tap(x + 2 * s), fy) +
                           fx * sharpening(tap(x - s + 1), m10, m11, tap(x + 2 * s + 1), fy);
-    const bool found = (weight > kMinHistoryWeight) & (disparity > 0.0f);
-    const bool sharpen = (same != 0) & (weight > kMinSharpenWeight);
-    const float scale = found ? 1.0f / weight : 0.0f;
-    const float linear = mean * scale;
+    const bool sharpen = (same != 0) & (weights[x] > kMinSharpenWeight);
+    const float linear = o.mean[x];
     const float sharp = lesser(greater(linear + (sharpen ? along_x + along_y : 0.0f), 0.0f), 1.0f);
-    o.mean[x] = found ? sharp : 0.0f;
-    o.square[x] = found ? square * scale + (sharp - linear) * (sharp + linear) : 0.0f; // keeps the variance
-    o.fast[x] = found ? fast * scale : 0.0f;
-    o.samples[x] = found ? lesser(samples, w.at.longest[x]) : 0.0f;
+    o.mean[x] = sharp;
+    o.square[x] += (sharp - linear) * (sharp + linear); // keeps the variance
   }
+}
+
+template <int kSquarings>
+void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
+                  const HistoryRow& out, float* weights) {
+  interpolate_run<kSquarings>(width, from, wanted, test_instances, out, weights);
+  float between = 0.0f;
+  for (int x = 0; x < width; ++x) between = greater(between, wanted.at.fraction_x[x] + wanted.at.fraction_y[x]);
+  if (between > 0.0f) sharpen_run(width, from, wanted, out, weights);
 }
 
 void accumulate_row(int width, const float* ao, const float* disparity, const HistoryLengths& longest,
