@@ -46,6 +46,8 @@ ImageSummary ImageSummarizer::finish() {
   add_problem(summary_, not_finite_pixels_, "is not finite; it counts as black", "are not finite; they count as black");
   add_problem(summary_, negative_pixels_, "has a negative value, which counts as 0",
               "have negative values, which count as 0");
+  add_problem(summary_, too_bright_pixels_, "is brighter than 1e25, which counts as 1e25",
+              "are brighter than 1e25, which counts as 1e25");
   return std::move(summary_);
 }
 

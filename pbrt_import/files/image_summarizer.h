@@ -35,7 +35,11 @@ public:
       pixel = glm::max(pixel, Vec3(0.0f));
     }
     row_ += DVec3(pixel);
-    if (want_radiance_) map_at(x, y) += pixel;
+    if (want_radiance_) {
+      constexpr float kBrightest = 1e25f; // sums of a map's pixels stay finite
+      too_bright_pixels_ += std::max({pixel.x, pixel.y, pixel.z}) > kBrightest;
+      map_at(x, y) += glm::min(pixel, Vec3(kBrightest));
+    }
     if (want_colours_)
       for (size_t c = 0; c < 3; ++c)
         summary_.rgb[(static_cast<size_t>(y) * width_ + x) * 3 + c] = srgb8_of_linear(pixel[static_cast<int>(c)]);
@@ -103,7 +107,7 @@ private:
   }
 
   ImageSummary summary_;
-  uint64_t not_finite_pixels_ = 0, negative_pixels_ = 0;
+  uint64_t not_finite_pixels_ = 0, negative_pixels_ = 0, too_bright_pixels_ = 0;
   uint32_t width_;
   bool want_mask_, want_colours_, want_radiance_;
   DVec3 row_{0.0}, total_{0.0};

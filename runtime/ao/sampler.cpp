@@ -33,26 +33,6 @@ constexpr std::array<Column, kBlockBits> kPixelColumns = {
 constexpr uint32_t kLatticeX[2] = {0x9a8d353du, 0x68baef85u}, kLatticeY[2] = {0xe98e138bu, 0x51c99870u};
 constexpr uint32_t kLatticeSample[2] = {0xc13fa9a9u, 0x91e10da5u};
 
-/// Owen's nested uniform scrambling by hashing: whether bit i flips depends only on the lower bits, which are the
-/// preceding digits. Source: Laine, Karras, "Stratified sampling for stochastic transparency" (2011); constants by
-/// Vegdahl, "Building a better LK hash" (2021).
-inline uint32_t scramble(uint32_t digits, uint32_t seed) {
-  digits ^= digits * 0x3d20adeau;
-  digits += seed;
-  digits *= (seed >> 16) | 1u;
-  digits ^= digits * 0x05526c56u;
-  digits ^= digits * 0x53a22864u;
-  return digits;
-}
-
-inline uint32_t reverse_bits(uint32_t v) {
-  v = ((v & 0x55555555u) << 1) | ((v >> 1) & 0x55555555u);
-  v = ((v & 0x33333333u) << 2) | ((v >> 2) & 0x33333333u);
-  v = ((v & 0x0f0f0f0fu) << 4) | ((v >> 4) & 0x0f0f0f0fu);
-  v = ((v & 0x00ff00ffu) << 8) | ((v >> 8) & 0x00ff00ffu);
-  return (v << 16) | (v >> 16);
-}
-
 /// Digits of a sample number in the second Sobol dimension. The generator matrix is Pascal's triangle modulo 2, whose
 /// entry (r, i) is 1 if r & ~i is 0; the first dimension's is the identity.
 inline uint32_t sobol_y(uint32_t number) {

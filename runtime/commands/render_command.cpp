@@ -51,9 +51,11 @@ void warn_of_flat_instances(const std::string& input, size_t count) {
 }
 
 /// Throws Error(kUsage) for two outputs to standard output, and for LOD layers of a render that has none.
-void check_targets(const ImageOutputs& outputs, const JsonOutput& json, const DetailConfig& detail, bool denoise) {
+void check_targets(const ImageOutputs& outputs, const JsonOutput& json, const DetailConfig& detail,
+                   const RenderOptions& options) {
   refuse_shared_stdout(outputs.to_stdout(), json);
-  require_denoiser_for(outputs.layers(), denoise);
+  require_denoiser_for(outputs.layers(), denoises(options));
+  require_shading_for(outputs.layers(), options);
   const bool levels = has_lod_layer(outputs.layers());
   if (levels && !detail.error_px) throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error");
   if (levels && detail.only_occlusion)
@@ -70,9 +72,9 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (!options.size.empty()) parse_size(options.size);
   JsonOutput json(globals.json, globals.force);
   const DetailConfig detail = detail_config(options.lod, json.wanted() || globals.verbosity > 0);
-  ImageOutputs outputs(options.outputs, options.aovs, {detail.camera_uses_levels(), denoises(options)}, globals.force,
+  ImageOutputs outputs(options.outputs, options.aovs, available_layers(options, detail), globals.force,
                        preview_style(options)); // reports unwritable files before any work
-  check_targets(outputs, json, detail, denoises(options));
+  check_targets(outputs, json, detail, options);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const RenderSetup setup(options, globals, detail, outputs.layers(), progress, display);
@@ -113,7 +115,8 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
 
 void add_render_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<RenderOptions>();
-  CLI::App& verb = add_verb(app, globals, "render", "Render denoised ambient occlusion of a .ptk file or a .pbrt scene",
+  CLI::App& verb = add_verb(app, globals, "render",
+                            "Render denoised ambient occlusion, or a shaded picture, of a .ptk file or a .pbrt scene",
                             [options, &globals] { return run(*options, globals); });
   add_render_options(verb, *options);
 }

@@ -26,7 +26,9 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
           "Layers to write, separated by commas. ao is denoised, ao_raw is the last frame before denoising, shaded is "
           "albedo times ao; others are depth, normal, instance, albedo (default: these in .exr, ao in .png), the views "
           "hit_distance, motion, previous_depth, local_variance, variance, history and disocclusion "
-          "(docs/command_line.md), with --lod-error lod and lod-error, and all. Several layers in .png become "
+          "(docs/command_line.md), with --lod-error lod and lod-error, with --view pbr and pbr+ao pbr (the default in "
+          ".png), "
+          "direct and specular, and all. Several layers in .png become "
           "NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
@@ -119,6 +121,7 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
   add_view_options(verb, options);
   add_frame_options(verb, options);
   add_quality_options(verb, options);
+  add_shade_options(verb, options.shade);
   add_tracer_options(verb, options);
   add_lod_options(verb, options.lod);
   add_sequence_options(verb, options.sequence);
@@ -130,6 +133,7 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
               "  packtrace render house.ptk -o house.png,house.exr --aov all --frames 256\n"
               "  packtrace render house.ptk -o - --background transparent | display\n"
               "  packtrace render forest.ptk -o forest.png --lod-error 1 --aov ao,lod\n"
+              "  packtrace render house.ptk -o house.png --view pbr+ao --tone-map aces\n"
               "  packtrace render scene.pbrt -o truth.exr --ground-truth --frames 256\n"
               "  packtrace render house.ptk --path orbit:90 --frames 96 -o 'frame_%04d.png'\n"
               "  packtrace render house.ptk --path turntable -o - --stream y4m | ffmpeg -i - turn.mp4");
@@ -142,6 +146,17 @@ void require_denoiser_for(const std::vector<std::string>& layers, bool denoise) 
     throw Error(ErrorKind::kUsage, "the layers variance, history and disocclusion require a denoiser");
 }
 
+void require_shading_for(const std::vector<std::string>& layers, const RenderOptions& options) {
+  if (!options.shade.shades() && has_shaded_layer(layers))
+    throw Error(ErrorKind::kUsage, "the layers pbr, direct and specular require --view pbr or pbr+ao");
+}
+
+AvailableLayers available_layers(const RenderOptions& options, const DetailConfig& detail) {
+  AvailableLayers layers{detail.camera_uses_levels(), denoises(options)};
+  layers.shaded = options.shade.shades();
+  return layers;
+}
+
 FrameConfig frame_config(const RenderOptions& options, const DetailConfig& detail) {
   FrameConfig config;
   config.supersample = options.supersample;
@@ -149,6 +164,7 @@ FrameConfig frame_config(const RenderOptions& options, const DetailConfig& detai
   config.denoiser = denoiser_config(options.denoiser, options.denoiser_settings);
   config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
   apply(options.ao, config);
+  apply(options.shade, config);
   if (options.ground_truth && (config.ao_resolution != AoResolution::kFull || config.ao_rate != AoRate::kFull))
     throw Error(ErrorKind::kUsage,
                 "--ground-truth needs all pixels; it does not go with --ao-resolution quarter or --ao-rate");
@@ -185,6 +201,7 @@ PreviewStyle preview_style(const RenderOptions& options) {
   PreviewStyle style;
   if (options.background) style.background = parse_background(*options.background);
   style.legend = !options.no_legend;
+  style.exposure = exposure(options.shade);
   return style;
 }
 

@@ -11,9 +11,11 @@
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/lod_render.h"
 #include "runtime/commands/sequence_options.h"
+#include "runtime/commands/shade_options.h"
 #include "runtime/frame/still.h"
 #include "runtime/trace/make_tracer.h"
 #include "runtime/view/layer_previews.h"
+#include "runtime/view/layers.h"
 
 namespace packtrace {
 
@@ -33,6 +35,7 @@ struct RenderOptions {
   std::string denoiser = "ours";
   std::vector<std::string> denoiser_settings; ///< NAME=VALUE
   AoOptions ao;
+  ShadeOptions shade;
   SceneOptions scene;
   uint64_t seed = 0;
   std::optional<std::string> backend; ///< if not set, the input decides
@@ -68,6 +71,12 @@ bool denoises(const RenderOptions& options);
 
 /// Throws Error(kUsage) for layers of the denoiser without one.
 void require_denoiser_for(const std::vector<std::string>& layers, bool denoise);
+
+/// Throws Error(kUsage) for layers of shading without it.
+void require_shading_for(const std::vector<std::string>& layers, const RenderOptions& options);
+
+/// The layers that a render has.
+AvailableLayers available_layers(const RenderOptions& options, const DetailConfig& detail);
 
 PreviewStyle preview_style(const RenderOptions& options);
 

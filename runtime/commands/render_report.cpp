@@ -168,6 +168,7 @@ nlohmann::json render_json(const RenderOptions& options, const StillConfig& conf
   };
   result["seconds"]["load"] = timings.load_s;
   result["seconds"]["write"] = timings.write_s;
+  add_shade_json(options.shade, report, loop, result);
   if (loop.detail() != nullptr) result["lod"] = detail_json(*loop.detail(), tracer);
   return result;
 }
@@ -184,6 +185,7 @@ void print_render(std::FILE* stream, const nlohmann::json& r) {
              r.at("mrays_per_s").at("primary").get<double>());
   fmt::print(stream, "  ao        {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("ao").get<double>(),
              r.at("mrays_per_s").at("ao").get<double>());
+  fmt::print(stream, "{}", shade_text(r));
   if (r.at("denoise").get<bool>())
     fmt::print(stream, "  denoise   {:8.3f} s   {:.1f} ms per frame\n", seconds.at("denoise").get<double>(),
                seconds.at("denoise").get<double>() * 1e3 / frames);

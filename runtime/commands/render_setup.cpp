@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "pbrt_import/base/file_error.h"
 #include "pbrt_import/base/with_file.h"
 #include "runtime/commands/image_outputs.h"
 #include "runtime/motion/motion_keys.h"
@@ -20,6 +21,12 @@ MemoryReservation reserve_picture(const RenderOptions& options, const FrameConfi
   });
 }
 
+SceneOptions scene_options(const RenderOptions& options) {
+  SceneOptions scene = options.scene;
+  scene.keep_shading = options.shade.shades();
+  return scene;
+}
+
 /// Whether the scene is shown at a time, not at rest.
 bool shows_motion(const RenderOptions& options) {
   return options.sequence.path || options.sequence.keys || options.sequence.start_time;
@@ -29,9 +36,13 @@ bool shows_motion(const RenderOptions& options) {
 
 RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& globals, const DetailConfig& detail,
                          const std::vector<std::string>& layers, Progress& progress, ProgressDisplay& display)
-    : loaded(load_scene(options.input, options.scene, globals, progress, display, options.private_copy)),
+    : loaded(load_scene(options.input, scene_options(options), globals, progress, display, options.private_copy)),
       load_s(loading.seconds()) {
   if (detail.error_px) require_levels(options.input, loaded);
+  if (options.shade.shades() && !loaded.source->has_shading())
+    throw FileError(ErrorKind::kUnsupported, options.input,
+                    "it holds no materials and lights, which --view " + options.shade.view +
+                        " needs; bake it again with --for shading");
   camera = choose_camera(*loaded.source, options, globals);
   prepare_motion(options, globals);
   config = make_config(*loaded.source, camera.camera, options, detail);

@@ -40,7 +40,7 @@ SequenceOutputs::SequenceOutputs(const std::vector<std::string>& files, const st
                     fmt::format("{}: --resume needs numbered files; a stream cannot be continued", name));
       if (aovs.size() > 1 || (aovs.size() == 1 && aovs[0] == "all"))
         throw Error(ErrorKind::kUsage, fmt::format("{} holds one layer; choose it with --aov", name));
-      video_layer_ = aovs.empty() ? "ao" : aovs[0];
+      video_layer_ = chosen_layers(aovs, available).front();
     }
     if (name == "-") {
       if (std::exchange(to_stdout_, true)) throw Error(ErrorKind::kUsage, "-o - was given twice");

@@ -94,6 +94,7 @@ std::string settings_text(const RenderOptions& options, const RenderSetup& setup
       {"lod",
        {lod.error_px.value_or(0.0), lod.scheme.value_or(""), lod.traced_ratio.value_or(-1.0),
         lod.culled_scale.value_or(0.0), lod.tolerance.value_or(0), lod.rays.value_or(""), lod.cull.value_or("")}},
+      {"shade", {options.shade.view, options.shade.exposure, options.shade.tone_map, options.shade.settings}},
       {"layers", options.aovs},
       {"background", options.background.value_or("")},
       {"legend", !options.no_legend},
@@ -151,6 +152,7 @@ void check_sequence(const RenderOptions& options, const SequenceOutputs& outputs
   if (options.ground_truth) throw Error(ErrorKind::kUsage, "--ground-truth renders stills; it does not go with --path");
   refuse_shared_stdout(outputs.to_stdout(), json);
   require_denoiser_for(outputs.layers(), denoises(options));
+  require_shading_for(outputs.layers(), options);
   if (has_lod_layer(outputs.layers()) && !detail.camera_uses_levels())
     throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error and --lod-rays all");
 }
@@ -162,8 +164,8 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
   tracer_config(options, globals, false); // reports wrong options before any work
   JsonOutput json(globals.json, globals.force);
   const DetailConfig detail = detail_config(options.lod, false);
-  SequenceOutputs outputs(options.outputs, options.aovs, {detail.camera_uses_levels(), denoises(options)},
-                          globals.force, preview_style(options), options.sequence);
+  SequenceOutputs outputs(options.outputs, options.aovs, available_layers(options, detail), globals.force,
+                          preview_style(options), options.sequence);
   check_sequence(options, outputs, json, detail);
   CsvOutput csv(options.sequence.csv, globals.force);
   ProgressDisplay display(globals);

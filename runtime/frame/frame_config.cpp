@@ -38,10 +38,12 @@ void FrameConfig::validate() const {
   require_setting(width <= kMaxTracedSide && height <= kMaxTracedSide && width * height <= kMaxTracedPixels,
                   "image size times supersample exceeds 65536 per side or 2^28 pixels");
   detail.validate();
+  packtrace::validate(shade);
 }
 
 uint64_t picture_bytes(const FrameConfig& config) {
-  const double pixel_bytes = (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0);
+  const double pixel_bytes =
+      (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0) + (config.shades() ? 110.0 : 0.0);
   constexpr double kMax = 0x1p62;
   const double side = config.supersample;
   const double bytes = pixel_bytes * side * side * static_cast<double>(config.size.width) * config.size.height;

@@ -7,6 +7,7 @@
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/denoise/denoiser_config.h"
 #include "runtime/lod/sharing_config.h"
+#include "runtime/shade/shade_config.h"
 
 namespace packtrace {
 
@@ -21,6 +22,13 @@ enum class AoRate : uint8_t {
   kFull,
   kCheckerboard, ///< every other pixel, alternating from frame to frame
   kAdaptive,     ///< more for surfaces that came into view lately, fewer for others (runtime/ao/adaptive_rate.h)
+};
+
+/// What a frame computes besides ambient occlusion.
+enum class FrameView : uint8_t {
+  kAo,
+  kPbr,   ///< shading, with ambient light that nothing occludes (docs/shading.md)
+  kPbrAo, ///< shading, with ambient occlusion
 };
 
 /// Which levels of detail the rays of a frame meet (docs/lod_runtime.md).
@@ -51,10 +59,13 @@ struct FrameConfig {
   AoRate ao_rate = AoRate::kFull;
   bool lod_layers = false;  ///< fill the LOD layers of RenderedImage
   bool view_layers = false; ///< fill its views of intermediate results
+  FrameView view = FrameView::kAo;
+  ShadeConfig shade; ///< of the other views
   AoConfig ao;
   DenoiserConfig denoiser;
   DetailConfig detail;
 
+  bool shades() const { return view != FrameView::kAo; }
   bool jitters() const { return jitter && ao_resolution == AoResolution::kFull; }
   /// Size at which rays are traced.
   ImageSize traced_size() const { return {size.width * supersample, size.height * supersample}; }

@@ -30,9 +30,11 @@ void forget_motion(GBuffer& gbuffer) {
   gbuffer.previous_z.clear();
 }
 
-FrameConfig validated(const FrameConfig& config) {
+FrameConfig validated(const FrameConfig& config, const FrameScene& scene) {
   config.validate();
   packtrace::validate(config.ao);
+  if (config.shades() && !scene.source->has_shading())
+    throw Error(ErrorKind::kUnsupported, "it holds no materials and lights for shading; bake it with --for shading");
   return config;
 }
 
@@ -61,12 +63,13 @@ struct SavedLoop {
   uint32_t state_bytes; ///< of SceneState
   uint64_t mean_bytes;  ///< of RawMean
   uint64_t rate_bytes;  ///< of AdaptiveRate
+  uint64_t shade_bytes; ///< of ShadedMean
 };
 
 } // namespace
 
 FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
-    : config_(validated(config)), state_(scene, config.detail), denoiser_(config.denoiser) {}
+    : config_(validated(config, scene)), state_(scene, config.detail), denoiser_(config.denoiser) {}
 
 FrameLoop::~FrameLoop() = default;
 
@@ -81,7 +84,7 @@ void FrameLoop::reset() {
 
 void FrameLoop::configure(const FrameConfig& config) {
   const DetailConfig detail = config_.detail;
-  config_ = validated(config);
+  config_ = validated(config, scene());
   config_.detail = detail;
   denoiser_ = AoDenoiser(config_.denoiser);
   denoised_ = nullptr;
@@ -90,13 +93,16 @@ void FrameLoop::configure(const FrameConfig& config) {
 }
 
 std::vector<std::byte> FrameLoop::save() const {
-  const std::vector<std::byte> mean = raw_mean_.save(), rate = adaptive_.save(), history = denoiser_.save();
+  const std::vector<std::byte> mean = raw_mean_.save(), rate = adaptive_.save(), shade = shaded_mean_.save(),
+                               history = denoiser_.save();
   const std::vector<uint8_t> state = state_.save();
-  const SavedLoop saved{next_number_, still_frames_, static_cast<uint32_t>(state.size()), mean.size(), rate.size()};
+  const SavedLoop saved{next_number_, still_frames_, static_cast<uint32_t>(state.size()),
+                        mean.size(),  rate.size(),   shade.size()};
   std::vector<std::byte> bytes(sizeof(saved));
   std::memcpy(bytes.data(), &saved, sizeof(saved));
-  for (const std::span<const std::byte> part : {std::as_bytes(std::span(state)), std::span<const std::byte>(mean),
-                                                std::span<const std::byte>(rate), std::span<const std::byte>(history)})
+  for (const std::span<const std::byte> part :
+       {std::as_bytes(std::span(state)), std::span<const std::byte>(mean), std::span<const std::byte>(rate),
+        std::span<const std::byte>(shade), std::span<const std::byte>(history)})
     bytes.insert(bytes.end(), part.begin(), part.end());
   return bytes;
 }
@@ -110,7 +116,9 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
   if (saved.state_bytes > bytes.size()) fail();
   const std::span<const std::byte> state = bytes.first(saved.state_bytes);
   bytes = bytes.subspan(state.size());
-  if (saved.mean_bytes > bytes.size() || saved.rate_bytes > bytes.size() - saved.mean_bytes) fail();
+  if (saved.mean_bytes > bytes.size() || saved.rate_bytes > bytes.size() - saved.mean_bytes ||
+      saved.shade_bytes > bytes.size() - saved.mean_bytes - saved.rate_bytes)
+    fail();
   if (saved.next_number <= saved.still_frames) fail();
   const ImageSize shaded =
       config_.ao_resolution == AoResolution::kFull
@@ -118,9 +126,11 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
           : ImageSize{(config_.traced_size().width + 1) / 2, (config_.traced_size().height + 1) / 2};
   reset();
   const auto mean = bytes.first(saved.mean_bytes), rate = bytes.subspan(mean.size(), saved.rate_bytes);
-  const auto history = bytes.subspan(mean.size() + rate.size());
+  const auto shade = bytes.subspan(mean.size() + rate.size(), saved.shade_bytes);
+  const auto history = bytes.subspan(mean.size() + rate.size() + shade.size());
   if ((config_.denoise ? history : mean).empty() || (config_.ao_rate == AoRate::kAdaptive) == rate.empty()) fail();
   if (!raw_mean_.restore(shaded.pixels(), mean) || !adaptive_.restore(shaded, rate)) fail();
+  if (config_.shades() == shade.empty() || !shaded_mean_.restore(config_.traced_size().pixels(), shade)) fail();
   denoiser_.restore(shaded, history);
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
@@ -164,6 +174,7 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
                              moved_on ? state_.previous_transforms() : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};
   trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen);
+  traced_view_.emplace(view);
   report_.times.primary_s = tracing.seconds();
   report_.primary_rays = gbuffer_.size.pixels();
   report_.hit_pixels = count_hits(gbuffer_);
@@ -178,6 +189,19 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
     half_ = halve(gbuffer_);
     report_.times.upsample_s += halving.seconds();
   }
+}
+
+/// Shades what the camera rays hit. Its tiles do not count in the progress, but it can cancel them.
+void FrameLoop::shade_frame(Progress& progress) {
+  Progress unseen([&progress](std::string_view, uint64_t, uint64_t) { progress.advance(0); });
+  const Stopwatch shading;
+  if (!shade_scene_) shade_scene_ = std::make_unique<ShadeScene>(*scene().source);
+  const ShadeSamples samples{config_.ao.seed, next_number_, ao_radius(config_.ao, traced_source().world_bounds())};
+  report_.shade_rays = trace_shading(state_.camera_source(), *tracers().front(), *shade_scene_, *traced_view_, gbuffer_,
+                                     config_.shade, samples, shaded_, unseen);
+  if (report_.moved) shaded_mean_.clear();
+  shaded_mean_.add(shaded_);
+  report_.times.shade_s += shading.seconds();
 }
 
 /// Adds the level, cluster and screen-space error of the camera rays' hits.
@@ -257,6 +281,8 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   if (config_.jitters()) raw_.samples = 1;
   report_.times.ao_s += tracing.seconds();
 
+  if (config_.shades()) shade_frame(progress);
+
   const Stopwatch layering;
   if (moved) layers_.clear();
   if (trace) layers_.add(gbuffer_, scene().source->materials());
@@ -314,10 +340,12 @@ void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
     times.upsample_s += upsampling.seconds();
     const Stopwatch filtering;
     layers_.resolve(config_, full_ao, raw, image);
+    if (config_.shades()) shaded_mean_.resolve(config_, full_ao, image);
     times.resolve_s += filtering.seconds();
   } else {
     const Stopwatch filtering;
     layers_.resolve(config_, ao, raw_.ao, image);
+    if (config_.shades()) shaded_mean_.resolve(config_, ao, image);
     times.resolve_s += filtering.seconds();
   }
   if (config_.view_layers) resolve_views(image);

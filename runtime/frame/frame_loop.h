@@ -16,6 +16,7 @@
 #include "runtime/frame/raw_mean.h"
 #include "runtime/frame/rendered_image.h"
 #include "runtime/frame/scene_state.h"
+#include "runtime/frame/shaded_mean.h"
 #include "runtime/frame/view_layers.h"
 
 namespace packtrace {
@@ -27,7 +28,8 @@ namespace packtrace {
 /// on the states of all frames since reset(), and on nothing else, in particular not on the number of threads.
 class FrameLoop {
 public:
-  /// Throws Error(kUsage) for settings out of range, or a detail without a file.
+  /// Throws Error(kUsage) for settings out of range, or a detail without a file; Error(kUnsupported) for shading
+  /// without SceneSource::has_shading().
   FrameLoop(const FrameScene& scene, const FrameConfig& config);
   ~FrameLoop();
 
@@ -51,7 +53,7 @@ public:
   void restore(const Camera& camera, double time_s, std::span<const std::byte> bytes);
 
   /// Goes on with other settings, whose `detail` is not read: levels of detail stay as they are. All frames are
-  /// forgotten; trees are kept. Throws Error(kUsage) for settings out of range.
+  /// forgotten; trees are kept. Throws as the constructor does.
   void configure(const FrameConfig& config);
   /// Sets FrameConfig::view_layers, from the next frame on. Forgets nothing.
   void show_views(bool shown) { config_.view_layers = shown; }
@@ -67,6 +69,8 @@ public:
   /// The source and the tracers in use: the camera's, and with only_occlusion also the occlusion rays'.
   const SceneSource& traced_source() const { return state_.traced_source(); }
   std::vector<const RayTracer*> tracers() const { return state_.tracers(); }
+  /// The lights and materials of shaded views; null before the first frame of one.
+  const ShadeScene* shade_scene() const { return shade_scene_.get(); }
   const DetailPlanner* detail() const { return state_.planner(); }
   /// Camera rays of the last frame that traced any.
   const GBuffer& gbuffer() const { return gbuffer_; }
@@ -77,6 +81,7 @@ private:
   bool traces(uint32_t still_frame) const;
   SamplePlan sample_plan(const GBuffer& shaded, std::span<const float> limits);
   void add_lod_layers(const PrimaryCamera& view);
+  void shade_frame(Progress& progress);
   std::vector<float> accumulated_ao(PictureReport& report);
   void resolve_views(RenderedImage& image);
 
@@ -84,6 +89,7 @@ private:
   SceneState state_;
   std::optional<Camera> camera_; ///< of the previous frame
   std::optional<PrimaryCamera> view_;
+  std::optional<PrimaryCamera> traced_view_; ///< of gbuffer_
   uint64_t next_number_ = 0;
   uint32_t still_frames_ = 0; ///< frames since something moved, without the first
   GBuffer gbuffer_, guides_;
@@ -93,6 +99,9 @@ private:
   AdaptiveRate adaptive_;
   RawMean raw_mean_;
   MeanLayers layers_;
+  std::unique_ptr<ShadeScene> shade_scene_;
+  ShadedFrame shaded_;
+  ShadedMean shaded_mean_;
   RenderedImage lod_layers_; ///< only its LOD layers
   ViewLayers views_;
   const DenoisedAo* denoised_ = nullptr; ///< of the denoiser's last denoise(); null without denoiser

@@ -22,6 +22,10 @@ struct RenderedImage {
   std::vector<Vec3> albedo;       ///< linear sRGB
   std::vector<Vec3> shaded;       ///< albedo times ao, as under a uniform white sky; emitters are white; linear sRGB
   std::vector<uint32_t> instance; ///< of the first camera ray that hits
+  // The next three are empty unless FrameConfig::shades(). They are means over all camera rays, those that miss too.
+  std::vector<Vec3> pbr;      ///< direct + specular + ambient light; linear sRGB radiance, not exposed
+  std::vector<Vec3> direct;   ///< light of lights at the surface, its emission; the background where nothing is hit
+  std::vector<Vec3> specular; ///< seen by reflection and through glass
   // The views (runtime/frame/view_layers.h) are empty unless FrameConfig::view_layers is set; the last three also
   // without the denoiser. They are those of the last frame, and 0 where its camera rays miss.
   std::vector<float>

@@ -21,6 +21,7 @@ set(packtrace_public_headers
   pbrt_import/scene/rigid_motion.h
   pbrt_import/scene/separate_motion.h
   pbrt_import/scene/scene.h
+  pbrt_import/scene/shading.h
   pbrt_import/scene/separate_motion.h
   # packtrace::format: baked files and their decoders
   compress/format/cluster/cluster_codec.h
@@ -39,6 +40,7 @@ set(packtrace_public_headers
   compress/format/motion/motion_summary.h
   compress/format/pages/page_codec.h
   compress/format/pages/page_contexts.h
+  compress/format/shading/shading_codec.h
   compress/format/textures/texture_codec.h
   # packtrace::bake: a Scene to a baked file
   compress/bake/bake_config.h
@@ -87,10 +89,17 @@ set(packtrace_public_headers
   runtime/frame/raw_mean.h
   runtime/frame/rendered_image.h
   runtime/frame/scene_state.h
+  runtime/frame/shaded_mean.h
   runtime/frame/still.h
   runtime/frame/view_layers.h
   runtime/motion/motion_targets.h
   runtime/motion/scene_motion.h
+  runtime/shade/bsdf.h
+  runtime/shade/environment.h
+  runtime/shade/light_set.h
+  runtime/shade/path_tracer.h
+  runtime/shade/shade_config.h
+  runtime/shade/shade_scene.h
   runtime/trace/embree/embree_tracer.h
   runtime/trace/make_tracer.h
   runtime/trace/movers.h

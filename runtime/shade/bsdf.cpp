@@ -2,17 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace packtrace {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
 /// Factor of Oren and Nayar's model relative to Lambert's.
 /// Source: Oren and Nayar, Generalization of Lambert's reflectance model, 1994, the qualitative model.
 float oren_nayar(Vec3 o, Vec3 i, float sigma_degrees) {
-  const float sigma = sigma_degrees * (kPi / 180.0f), s2 = sigma * sigma;
+  const float sigma = sigma_degrees * (kShadePi / 180.0f), s2 = sigma * sigma;
   const float a = 1.0f - s2 / (2.0f * (s2 + 0.33f)), b = 0.45f * s2 / (s2 + 0.09f);
   const float sin_o = std::sqrt(std::max(0.0f, 1.0f - o.z * o.z)), sin_i = std::sqrt(std::max(0.0f, 1.0f - i.z * i.z));
   if (sin_o < 1e-4f || sin_i < 1e-4f) return a;
@@ -54,7 +51,7 @@ Vec3 refracted(Vec3 outgoing, Vec3 normal, float eta) {
 float Ggx::density(Vec3 half) const {
   const float a2 = alpha * alpha, z2 = half.z * half.z;
   const float t = z2 * (a2 - 1.0f) + 1.0f;
-  return a2 / (kPi * t * t);
+  return a2 / (kShadePi * t * t);
 }
 
 float Ggx::lambda(Vec3 v) const {
@@ -67,7 +64,7 @@ Vec3 Ggx::visible_normal(Vec3 o, Vec2 u) const {
   const float length2 = stretched.x * stretched.x + stretched.y * stretched.y;
   const Vec3 tangent = length2 > 1e-12f ? Vec3(-stretched.y, stretched.x, 0.0f) / std::sqrt(length2) : Vec3(1, 0, 0);
   const Vec3 bitangent = glm::cross(stretched, tangent);
-  const float radius = std::sqrt(u.x), angle = 2.0f * kPi * u.y;
+  const float radius = std::sqrt(u.x), angle = 2.0f * kShadePi * u.y;
   const float x = radius * std::cos(angle), s = 0.5f * (1.0f + stretched.z);
   const float y = (1.0f - s) * std::sqrt(std::max(0.0f, 1.0f - x * x)) + s * radius * std::sin(angle);
   const Vec3 n = x * tangent + y * bitangent + std::sqrt(std::max(0.0f, 1.0f - x * x - y * y)) * stretched;
@@ -96,7 +93,7 @@ Vec3 ShadedSurface::reflectance(float cosine, float eta) const {
 
 Vec3 ShadedSurface::evaluate_diffuse(Vec3 o, Vec3 i, Vec3 kept) const {
   const float factor = shading.sigma > 0.0f ? oren_nayar(o, i, shading.sigma) : 1.0f;
-  return diffuse * kept * (factor * i.z / kPi);
+  return diffuse * kept * (factor * i.z / kShadePi);
 }
 
 Vec3 ShadedSurface::evaluate_specular(Vec3 o, Vec3 i, float eta) const {

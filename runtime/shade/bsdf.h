@@ -7,6 +7,8 @@
 
 namespace packtrace {
 
+inline constexpr float kShadePi = 3.14159265358979f;
+
 /// Surfaces with less roughness reflect in one direction only.
 inline constexpr float kSmoothAlpha = 1e-3f;
 

@@ -9,8 +9,6 @@
 namespace packtrace {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 struct LatLong {
   float s, t; ///< in the image
   float sin_theta;
@@ -18,8 +16,8 @@ struct LatLong {
 
 LatLong lat_long(Vec3 d) {
   float phi = std::atan2(d.y, d.x);
-  if (phi < 0.0f) phi += 2.0f * std::numbers::pi_v<float>;
-  return {phi / (2.0f * std::numbers::pi_v<float>), std::acos(std::clamp(d.z, -1.0f, 1.0f)) / std::numbers::pi_v<float>,
+  if (phi < 0.0f) phi += 2.0f * kShadePi;
+  return {phi / (2.0f * kShadePi), std::acos(std::clamp(d.z, -1.0f, 1.0f)) / kShadePi,
           std::sqrt(std::max(0.0f, d.x * d.x + d.y * d.y))};
 }
 
@@ -39,7 +37,7 @@ Environment::Environment(const EnvironmentMap& map) : map_(map) {
   DVec3 mean(0.0);
   std::vector<double> row_sum(height);
   for (size_t y = 0; y < height; ++y) {
-    const double sine = std::sin(kPi * (static_cast<double>(y) + 0.5) / static_cast<double>(height));
+    const double sine = std::sin(std::numbers::pi * (static_cast<double>(y) + 0.5) / static_cast<double>(height));
     double sum = 0.0;
     for (size_t x = 0; x < width; ++x) {
       // The mean of the neighbours: not 0 wherever the interpolated radiance is not.
@@ -87,9 +85,8 @@ Vec3 Environment::radiance(Vec3 direction) const {
 SampledDirection Environment::sample(Vec2 point) const {
   const auto [row, in_row] = find_step(rows_.data(), rows_.size(), point.y);
   const auto [column, in_column] = find_step(&cumulative_[row * map_.width], map_.width, point.x);
-  const float phi =
-      2.0f * std::numbers::pi_v<float> * (static_cast<float>(column) + in_column) / static_cast<float>(map_.width);
-  const float theta = std::numbers::pi_v<float> * (static_cast<float>(row) + in_row) / static_cast<float>(map_.height);
+  const float phi = 2.0f * kShadePi * (static_cast<float>(column) + in_column) / static_cast<float>(map_.width);
+  const float theta = kShadePi * (static_cast<float>(row) + in_row) / static_cast<float>(map_.height);
   const float sine = std::sin(theta);
   const Vec3 direction(sine * std::cos(phi), sine * std::sin(phi), std::cos(theta));
   return {direction, density(direction)};
@@ -103,7 +100,7 @@ float Environment::density(Vec3 direction) const {
   const size_t i = y * map_.width + x;
   const float in_row = cumulative_[i] - (x == 0 ? 0.0f : cumulative_[i - 1]);
   const float pixels = static_cast<float>(map_.width) * static_cast<float>(map_.height);
-  constexpr float kTwoPiSquared = 2.0f * std::numbers::pi_v<float> * std::numbers::pi_v<float>;
+  constexpr float kTwoPiSquared = 2.0f * kShadePi * kShadePi;
   return in_row * row_share_[y] * pixels / (kTwoPiSquared * place.sin_theta);
 }
 

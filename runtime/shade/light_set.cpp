@@ -13,7 +13,6 @@
 namespace packtrace {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 bool both_sides(const Material& material) { return (material.flags & kEmitsBothSides) != 0; }
@@ -42,7 +41,7 @@ LightSet::LightSet(const SceneSource& source) : source_(source) {
   if (std::ranges::any_of(source.materials(), [](const Material& m) { return m.shading.emits(); })) add_emitters();
   if (lights_.empty() && triangles_.empty()) {
     Light sky;
-    sky.kind = LightKind::kInfinite;
+    sky.kind = LightKind::kInfinite, sky.radiance = Vec3(kDefaultSky);
     lights_.push_back(sky);
     uses_sky_ = true;
   }
@@ -163,7 +162,7 @@ LightSample LightSet::sample_light(const Light& light, const Environment* map, V
       chosen.direction = light.world_from_light * chosen.direction;
     } else {
       const Vec3 local = cosine_direction(point);
-      chosen = {turned_to(normal, local), local.z / kPi};
+      chosen = {turned_to(normal, local), local.z / kShadePi};
     }
     if (!(chosen.density > 0.0f)) return {};
     return {chosen.direction, kFar, radiance_of(light, map, chosen.direction) / chosen.density, chosen.density};
@@ -185,7 +184,7 @@ Vec3 LightSet::radiance_of(const Light& light, const Environment* map, Vec3 dire
 
 float LightSet::density_of(const Light& light, const Environment* map, Vec3 direction, Vec3 normal) {
   return map != nullptr ? map->density(glm::transpose(light.world_from_light) * direction)
-                        : std::max(0.0f, glm::dot(direction, normal)) / kPi;
+                        : std::max(0.0f, glm::dot(direction, normal)) / kShadePi;
 }
 
 Vec3 LightSet::background(Vec3 direction) const {

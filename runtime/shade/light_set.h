@@ -8,6 +8,10 @@
 
 namespace packtrace {
 
+/// Radiance of the white sky that stands for the lights of a scene without any. With the default ambient light, an
+/// open white surface is white.
+inline constexpr float kDefaultSky = 0.6f;
+
 /// A sample of the lights as seen from a point.
 struct LightSample {
   Vec3 direction{0.0f};  ///< from the point to the light, unit length
@@ -19,7 +23,7 @@ struct LightSample {
 /// All lights of a scene, to be sampled: the scene's lights and the triangles of its area lights, at rest.
 class LightSet {
 public:
-  /// A scene without any light gets a constant white sky of radiance 1.
+  /// A scene without any light gets a constant white sky of radiance kDefaultSky.
   /// @param source must outlive this object
   explicit LightSet(const SceneSource& source);
 

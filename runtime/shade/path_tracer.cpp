@@ -1,26 +1,21 @@
 #include "runtime/shade/path_tracer.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <tuple>
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include "runtime/ao/hash.h"
 #include "runtime/ao/hemisphere.h"
+#include "runtime/ao/sampler.h"
 #include "runtime/camera/tiles.h"
 #include "runtime/shade/hit_surfaces.h"
 #include "runtime/shade/shadow_rays.h"
 
 namespace packtrace {
 namespace {
-
-using Vec3Key = std::array<float, 3>;
 
 constexpr float kFaint = 1e-4f;       ///< paths that carry less of each colour end
 constexpr uint32_t kMaxVertices = 26; ///< surfaces of a path: 8 reflections, 16 transmissions
@@ -47,21 +42,35 @@ struct Frame {
   Vec3 world(Vec3 v) const { return v.x * tangent + v.y * bitangent + v.z * normal; }
 };
 
-/// Sample points of a path's vertices: a sequence per vertex and purpose.
+/// Sample points of a path's vertices: scrambled Sobol sequences, a sequence per vertex and purpose. Each has an order
+/// of its own, since sequences that differ in their scrambling alone are correlated. Source: Burley, Practical
+/// Hash-based Owen Scrambling, JCGT 2020.
 class PathSamplers {
 public:
   enum Purpose : uint32_t { kLightPoint, kLightChoice, kLobe, kAmbient, kPurposes };
 
-  explicit PathSamplers(const ShadeSamples& samples) {
-    for (uint32_t i = 0; i < kMaxVertices * kPurposes; ++i)
-      samplers_.emplace_back(samples.sampler, samples.seed + hash_combine(0x5bade5u, i));
+  explicit PathSamplers(uint64_t seed) {
+    for (uint32_t i = 0; i < kMaxVertices * kPurposes; ++i) {
+      orders_.push_back(hash_combine(static_cast<uint32_t>(seed), i));
+      samplers_.emplace_back(SamplerKind::kPixelSobol, seed + orders_.back());
+    }
   }
   Vec2 point(uint32_t vertex, Purpose purpose, uint32_t x, uint32_t y, uint32_t sample) const {
-    const PixelSampler& sampler = samplers_[vertex * kPurposes + purpose];
-    return sampler.point(sampler.pixel(x, y), sample);
+    const uint32_t sequence = vertex * kPurposes + purpose;
+    const uint32_t order = hash_combine(hash_combine(orders_[sequence], x), y);
+    const PixelSampler& sampler = samplers_[sequence];
+    return sampler.point(sampler.pixel(x, y), shuffled(sample, order));
   }
 
 private:
+  /// Shuffles numbers so that those of each aligned block of 2^k stay together in one, within the sequences' length.
+  static uint32_t shuffled(uint32_t number, uint32_t seed) {
+    constexpr uint32_t kLength = 1u << 16;
+    return (number & ~(kLength - 1)) |
+           (reverse_bits(scramble(reverse_bits(number & (kLength - 1)), seed)) & (kLength - 1));
+  }
+
+  std::vector<uint32_t> orders_;
   std::vector<PixelSampler> samplers_;
 };
 
@@ -92,7 +101,7 @@ public:
   PathTracer(const SceneSource& source, const RayTracer& tracer, const ShadeScene& scene, const PrimaryCamera& camera,
              const GBuffer& gbuffer, const ShadeConfig& config, const ShadeSamples& samples, ShadedFrame& frame)
       : tracer_(tracer), scene_(scene), lights_(scene.lights()), camera_(camera), gbuffer_(gbuffer), config_(config),
-        samples_(samples), surfaces_(source, tracer), samplers_(samples), frame_(frame) {}
+        samples_(samples), surfaces_(source, tracer), samplers_(samples.seed), frame_(frame) {}
 
   uint64_t trace_tile(const Tile& tile, PathMemory& m, const Progress& progress) const {
     m.pixels.clear();
@@ -355,24 +364,6 @@ private:
 };
 
 } // namespace
-
-ShadeScene::ShadeScene(const SceneSource& source) : lights_(source) {
-  using Key = std::tuple<ShadingBits, float, float, Vec3Key, Vec3Key, Vec3Key>;
-  const auto key = [](Vec3 v) { return Vec3Key{v.x, v.y, v.z}; };
-  std::map<Key, uint32_t> numbers;
-  std::vector<SurfaceShading> distinct;
-  for (const Material& material : source.materials()) {
-    const SurfaceShading& s = material.shading;
-    transmits_ = transmits_ || s.transmits();
-    const auto [it, inserted] =
-        numbers.try_emplace({s.fresnel(), s.eta, s.roughness, key(s.specular), key(s.metal_eta), key(s.metal_k)},
-                            static_cast<uint32_t>(distinct.size()));
-    if (inserted) distinct.push_back(s);
-    albedo_of_.push_back(it->second);
-  }
-  albedos_.resize(distinct.size());
-  tbb::parallel_for(size_t{0}, distinct.size(), [&](size_t i) { albedos_[i] = DirectionalAlbedo(distinct[i]); });
-}
 
 uint64_t trace_shading(const SceneSource& source, const RayTracer& tracer, const ShadeScene& scene,
                        const PrimaryCamera& camera, const GBuffer& gbuffer, const ShadeConfig& config,

@@ -1,37 +1,16 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "pbrt_import/base/progress.h"
 #include "pbrt_import/scene/camera_rays.h"
-#include "runtime/ao/sampler.h"
 #include "runtime/camera/gbuffer.h"
-#include "runtime/shade/bsdf.h"
-#include "runtime/shade/light_set.h"
 #include "runtime/shade/shade_config.h"
+#include "runtime/shade/shade_scene.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {
-
-/// What a scene's shading needs besides its surfaces: lights, and what is computed once per material.
-class ShadeScene {
-public:
-  /// @param source must outlive this object
-  explicit ShadeScene(const SceneSource& source);
-
-  const LightSet& lights() const { return lights_; }
-  const DirectionalAlbedo& albedo(uint32_t material) const { return albedos_[albedo_of_[material]]; }
-  /// Whether light may pass through some surface.
-  bool transmits() const { return transmits_; }
-
-private:
-  LightSet lights_;
-  std::vector<uint32_t> albedo_of_; ///< by material
-  std::vector<DirectionalAlbedo> albedos_;
-  bool transmits_ = false;
-};
 
 /// Radiance of one frame, linear sRGB, one entry per pixel.
 struct ShadedFrame {
@@ -43,7 +22,6 @@ struct ShadedFrame {
 
 /// Numbers and length of the samples of a frame.
 struct ShadeSamples {
-  SamplerKind sampler = SamplerKind::kSpaceTimeNet;
   uint64_t seed = 0;
   uint64_t frame = 0;          ///< number of the frame in the pixels' sequences
   float ambient_radius = 1.0f; ///< world units: reach of the rays that occlude the ambient light behind mirrors

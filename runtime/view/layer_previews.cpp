@@ -22,6 +22,22 @@ Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
   return picture;
 }
 
+/// The radiance of a shaded layer; null for other layers.
+const std::vector<Vec3>* radiance_of(const RenderedImage& image, const std::string& aov) {
+  if (aov == "pbr") return &image.pbr;
+  if (aov == "direct") return &image.direct;
+  return aov == "specular" ? &image.specular : nullptr;
+}
+
+Image exposed_picture(ImageSize size, const std::vector<Vec3>& radiance, const Exposure& exposure) {
+  Image picture(size, 3);
+  for (size_t i = 0; i < radiance.size(); ++i) {
+    const Vec3 display = display_of_radiance(radiance[i], exposure);
+    std::copy_n(&display.x, 3, picture.data.begin() + static_cast<std::ptrdiff_t>(3 * i));
+  }
+  return picture;
+}
+
 float longest_motion(const RenderedImage& image) {
   std::vector<float> lengths;
   lengths.reserve(image.motion.size());
@@ -99,6 +115,10 @@ const std::vector<float>* view_of(const RenderedImage& image, const std::string&
 }
 
 Image layer_preview(const RenderedImage& image, const std::string& aov, const PreviewStyle& style) {
+  if (const std::vector<Vec3>* radiance = radiance_of(image, aov)) {
+    const Image exposed = exposed_picture(image.size, *radiance, style.exposure);
+    return style.background ? over_background(exposed, image.coverage, *style.background) : exposed;
+  }
   const bool picture = aov == "albedo" || aov == "shaded";
   const Background usual =
       picture ? Background{Background::Kind::kSky, Vec3(0)} : Background{Background::Kind::kColor, kDefaultBackground};

@@ -6,13 +6,16 @@
 #include "runtime/frame/rendered_image.h"
 #include "runtime/image/background.h"
 #include "runtime/image/image.h"
+#include "runtime/image/tone_map.h"
 
 namespace packtrace {
 
 /// How layers are displayed in .png files.
 struct PreviewStyle {
-  std::optional<Background> background; ///< if not set: sky for albedo and shaded, kDefaultBackground for other layers
+  std::optional<Background> background; ///< if not set: sky for albedo and shaded, none for pbr, direct and
+                                        ///< specular, kDefaultBackground for other layers
   bool legend = true;                   ///< add a colour scale below layers in false colours
+  Exposure exposure{};                  ///< of pbr, direct and specular
 };
 
 /// A view that is one number per pixel: "history" and the like; null for other names.

@@ -15,11 +15,15 @@ constexpr std::array kBaseLayers{"ao", "ao_raw", "depth", "normal", "instance", 
 /// Layers that need LOD levels.
 constexpr std::array kLodLayers{"lod", "lod-error"};
 
+/// Layers of shaded images.
+constexpr std::array kShadedLayers{"pbr", "direct", "specular"};
+
 bool contains(const auto& names, const std::string& name) { return std::ranges::find(names, name) != names.end(); }
 
 /// The layers of the result itself.
 std::vector<std::string> result_layers(AvailableLayers available) {
   std::vector<std::string> names(kBaseLayers.begin(), kBaseLayers.end());
+  if (available.shaded) names.insert(names.begin(), kShadedLayers.begin(), kShadedLayers.end());
   if (available.levels) names.insert(names.end(), kLodLayers.begin(), kLodLayers.end());
   return names;
 }
@@ -47,12 +51,15 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   if (aov == "lod-error") return {aov, {""}, std::span<const float>(image.lod_error)};
   if (aov == "motion") return {aov, {"X", "Y"}, motion_floats(image.motion)};
   if (const std::vector<float>* view = view_of(image, aov)) return {aov, {""}, std::span<const float>(*view)};
+  if (aov == "pbr") return {aov, rgb, floats_of(image.pbr)};
+  if (aov == "direct") return {aov, rgb, floats_of(image.direct)};
+  if (aov == "specular") return {aov, rgb, floats_of(image.specular)};
   if (aov == "albedo") return {aov, rgb, floats_of(image.albedo), true};
   return {aov, rgb, floats_of(image.shaded), true};
 }
 
 std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, AvailableLayers available) {
-  if (aovs.empty()) return {"ao"};
+  if (aovs.empty()) return {available.shaded ? "pbr" : "ao"};
   if (contains(aovs, "all")) {
     std::vector<std::string> names = result_layers(available);
     if (available.views) names.insert(names.end(), kTracedViews.begin(), kTracedViews.end());
@@ -84,6 +91,10 @@ bool has_view_layer(const std::vector<std::string>& layers) {
          std::ranges::any_of(layers, [](const std::string& layer) { return contains(kTracedViews, layer); });
 }
 
+bool has_shaded_layer(const std::vector<std::string>& layers) {
+  return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kShadedLayers, layer); });
+}
+
 bool has_lod_layer(const std::vector<std::string>& layers) {
   return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kLodLayers, layer); });
 }
@@ -91,6 +102,7 @@ bool has_lod_layer(const std::vector<std::string>& layers) {
 const std::vector<std::string>& aov_names() {
   static const std::vector<std::string> kNames = [] {
     std::vector<std::string> names(kBaseLayers.begin(), kBaseLayers.end());
+    names.insert(names.end(), kShadedLayers.begin(), kShadedLayers.end());
     names.insert(names.end(), kTracedViews.begin(), kTracedViews.end());
     names.insert(names.end(), kDenoiserViews.begin(), kDenoiserViews.end());
     names.insert(names.end(), kLodLayers.begin(), kLodLayers.end());

@@ -13,13 +13,14 @@ struct AvailableLayers {
   bool levels = false;   ///< camera rays use LOD levels
   bool denoiser = false; ///< it is denoised, by a frame loop
   bool views = true;     ///< it is rendered, not read from a file
+  bool shaded = false;   ///< it is rendered with FrameConfig::shades()
 };
 
 /// Names of the layers that a render can write.
 const std::vector<std::string>& aov_names();
 
 /// Returns the layers to write, without repetitions. Throws Error(kUsage) for unknown layers.
-/// @param aovs layers from aov_names(), or "all"; empty: "ao"
+/// @param aovs layers from aov_names(), or "all"; empty: "pbr" of shaded images, else "ao"
 std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, AvailableLayers available);
 
 /// Same for an .exr file: without `aovs` the layers of the result, without views of intermediate ones.
@@ -29,6 +30,9 @@ std::vector<std::string> chosen_exr_layers(const std::vector<std::string>& aovs,
 /// denoiser.
 bool has_view_layer(const std::vector<std::string>& layers);
 bool has_denoiser_layer(const std::vector<std::string>& layers);
+
+/// Whether one of the layers needs a shaded image.
+bool has_shaded_layer(const std::vector<std::string>& layers);
 
 /// A layer of an .exr file, which refers to the image.
 /// @param aov one of aov_names()

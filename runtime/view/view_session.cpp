@@ -34,6 +34,7 @@ void add_report(const PictureReport& of_pane, PictureReport& sum) {
 
 std::vector<std::string> view_layer_names() {
   std::vector<std::string> names = aov_names();
+  std::erase_if(names, [](const std::string& name) { return has_shaded_layer({name}); });
   names.insert(names.begin() + 1, PaneState::kGroundTruth);
   return names;
 }

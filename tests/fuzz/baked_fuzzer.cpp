@@ -172,6 +172,10 @@ void read_rest(const BakedFile& file) {
     for (const uint32_t mask : {material.alpha_mask, material.shadow_alpha_mask})
       require(mask == kNoMask || mask < file.sections().masks.size(), "mask number");
   }
+  const ShadingData shading = file.shading();
+  require(shading.materials.size() == (file.has_shading() ? file.sections().materials.size() : 0), "shading");
+  for (const Light& light : shading.lights)
+    require(light.map == kNoMap || light.map < shading.maps.size(), "map of a light");
   require(file.cameras().size() == file.sections().cameras.size(), "number of cameras");
   (void)file.world_bounds();
   read_frames(file);

@@ -23,7 +23,7 @@ Scene read_scene(const std::filesystem::path& input) {
   const std::string text(std::istreambuf_iterator<char>(in), {});
   fuzz::SceneFilesFolder files;
   ImportOptions options;
-  options.keep_textures = true;
+  options.keep_textures = options.keep_shading = true;
   options.tessellation_tolerance = 0.1; // coarse tessellation: in small files, small changes matter more
   Diagnostics diagnostics;
   Progress progress;

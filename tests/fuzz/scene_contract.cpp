@@ -44,6 +44,35 @@ void require_material(const Material& material, Uses& masks, Uses& textures) {
   textures.add(material.albedo_texture, "texture number");
 }
 
+bool is_colour(Vec3 v, float high) {
+  return v.x >= 0.0f && v.y >= 0.0f && v.z >= 0.0f && std::max({v.x, v.y, v.z}) <= high;
+}
+
+void require_shading(const SurfaceShading& s) {
+  require((s.bits & ~kAllShadingBits) == 0, "shading bits");
+  require(s.diffuse >= 0.0f && s.diffuse <= 1.0f && is_colour(s.specular, 1.0f) && is_colour(s.transmission, 1.0f),
+          "reflection outside [0,1]");
+  require(is_colour(s.emission, 3e38f) && is_colour(s.metal_eta, 1e6f) && is_colour(s.metal_k, 1e6f),
+          "emission or index");
+  require(s.eta >= 1.0f && s.eta <= 8.0f && s.roughness >= 0.0f && s.roughness <= 2.0f && s.sigma >= 0.0f &&
+              s.sigma <= 90.0f,
+          "index, roughness or sigma");
+}
+
+void require_light(const Light& light, const Scene& scene) {
+  require(is_colour(light.radiance, 3e38f) && is_finite(light.position), "brightness or place of a light");
+  require(std::abs(glm::length(light.direction) - 1.0f) < 1e-5f, "direction of a light");
+  require(light.cos_outer <= light.cos_inner && light.cos_outer >= -1.0f && light.cos_inner <= 1.0f, "cone of a light");
+  require(light.map == kNoMap || light.map < scene.environment_maps.size(), "map of a light");
+}
+
+void require_map(const EnvironmentMap& map) {
+  require(map.width > 0 && map.height > 0 && map.width <= kMaxMapWidth && map.height <= kMaxMapHeight &&
+              map.radiance.size() == size_t{map.width} * map.height,
+          "size of an environment map");
+  for (const Vec3 pixel : map.radiance) require(is_colour(pixel, INFINITY) && is_finite(pixel), "pixel of a map");
+}
+
 void require_texture(const AlbedoTexture& texture) {
   require(texture.width > 0 && texture.height > 0, "texture without texels");
   require(texture.rgb.size() == size_t{3} * texture.width * texture.height, "size of a texture");
@@ -122,7 +151,10 @@ void require_scene_contract(const Scene& scene) {
     objects.add(instance.object, "object number");
     require(is_affine_invertible(DAffine(instance.world_from_object)), "instance transform");
   }
-  for (const Material& material : scene.materials) require_material(material, masks, textures);
+  for (const Material& material : scene.materials)
+    require_material(material, masks, textures), require_shading(material.shading);
+  for (const Light& light : scene.lights) require_light(light, scene);
+  for (const EnvironmentMap& map : scene.environment_maps) require_map(map);
   for (const AlbedoTexture& texture : scene.textures) require_texture(texture);
   for (const AlphaMask& mask : scene.masks) require_mask(mask);
   for (const Camera& camera : scene.cameras) {

@@ -1,0 +1,30 @@
+#include "runtime/shade/shade_scene.h"
+
+#include <array>
+#include <map>
+#include <tuple>
+
+#include <tbb/parallel_for.h>
+
+namespace packtrace {
+
+ShadeScene::ShadeScene(const SceneSource& source) : lights_(source) {
+  using Floats = std::array<float, 3>;
+  using Key = std::tuple<ShadingBits, float, float, Floats, Floats, Floats>;
+  const auto key = [](Vec3 v) { return Floats{v.x, v.y, v.z}; };
+  std::map<Key, uint32_t> numbers;
+  std::vector<SurfaceShading> distinct;
+  for (const Material& material : source.materials()) {
+    const SurfaceShading& s = material.shading;
+    transmits_ = transmits_ || s.transmits();
+    const auto [it, inserted] =
+        numbers.try_emplace({s.fresnel(), s.eta, s.roughness, key(s.specular), key(s.metal_eta), key(s.metal_k)},
+                            static_cast<uint32_t>(distinct.size()));
+    if (inserted) distinct.push_back(s);
+    albedo_of_.push_back(it->second);
+  }
+  albedos_.resize(distinct.size());
+  tbb::parallel_for(size_t{0}, distinct.size(), [&](size_t i) { albedos_[i] = DirectionalAlbedo(distinct[i]); });
+}
+
+} // namespace packtrace

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/shade/bsdf.h"
+#include "runtime/shade/light_set.h"
+
+namespace packtrace {
+
+/// What a scene's shading needs besides its surfaces: lights, and what is computed once per material.
+class ShadeScene {
+public:
+  /// @param source must outlive this object
+  explicit ShadeScene(const SceneSource& source);
+
+  const LightSet& lights() const { return lights_; }
+  const DirectionalAlbedo& albedo(uint32_t material) const { return albedos_[albedo_of_[material]]; }
+  /// Whether light may pass through some surface.
+  bool transmits() const { return transmits_; }
+
+private:
+  LightSet lights_;
+  std::vector<uint32_t> albedo_of_; ///< by material
+  std::vector<DirectionalAlbedo> albedos_;
+  bool transmits_ = false;
+};
+
+} // namespace packtrace
