@@ -50,7 +50,7 @@ void HitSurfaces::look_up(std::span<const Ray> rays, std::span<const RayHit> hit
       if (const double size = glm::length(normal); size > 0.0)
         point.normal = Vec3(normal * ((glm::dot(normal, facing) < 0.0 ? -1.0 : 1.0) / size));
     }
-    point.material = attributes[i].material;
+    point.material = attributes[i].material, point.instance = placement.instance;
     point.albedo = surface_albedo(source_, surface.geometry, surface.triangle, point.material, places[i].barycentrics);
     point.offset = static_cast<float>(ray_offset(surface, space, position, facing) * space.inverse_scale());
     point.outer = is_outer(source_.materials()[point.material], back);
@@ -61,6 +61,7 @@ HitPoint HitSurfaces::of_pixel(const GBuffer& g, size_t pixel) const {
   HitPoint point;
   point.position = g.position[pixel], point.geometric = g.geometric_normal[pixel], point.normal = g.normal[pixel];
   point.albedo = g.albedo[pixel], point.offset = g.offset[pixel], point.material = g.material[pixel];
+  point.instance = g.instance[pixel];
   point.outer = is_outer(source_.materials()[point.material], g.back_face[pixel] != 0);
   return point;
 }

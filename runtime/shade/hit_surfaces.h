@@ -15,7 +15,7 @@ struct HitPoint {
   Vec3 normal{0.0f};    ///< shading normal in the same hemisphere
   Vec3 albedo{0.0f};
   float offset = 0.0f; ///< of rays that leave it, world units
-  uint32_t material = 0;
+  uint32_t material = 0, instance = 0;
   bool outer = true; ///< the ray comes from the outer side
 };
 

@@ -17,8 +17,10 @@ constexpr float kFar = std::numeric_limits<float>::infinity();
 
 bool both_sides(const Material& material) { return (material.flags & kEmitsBothSides) != 0; }
 
+constexpr uint32_t kNoEmitter = ~0u;
+
 /// Finds a number in [0, 1) in cumulative shares, and stretches the rest to [0, 1).
-std::pair<size_t, float> find_share(const std::vector<float>& steps, float u) {
+std::pair<size_t, float> find_share(std::span<const float> steps, float u) {
   const auto i = static_cast<size_t>(std::upper_bound(steps.begin(), steps.end() - 1, u) - steps.begin());
   const float begin = i == 0 ? 0.0f : steps[i - 1], width = steps[i] - begin;
   return {i, width > 0.0f ? std::clamp((u - begin) / width, 0.0f, 0x1.fffffep-1f) : 0.0f};
@@ -39,7 +41,7 @@ LightSet::LightSet(const SceneSource& source) : source_(source) {
   environments_.reserve(source.environment_maps().size());
   for (const EnvironmentMap& map : source.environment_maps()) environments_.emplace_back(map);
   if (std::ranges::any_of(source.materials(), [](const Material& m) { return m.shading.emits(); })) add_emitters();
-  if (lights_.empty() && triangles_.empty()) {
+  if (lights_.empty() && emitters_.empty()) {
     Light sky;
     sky.kind = LightKind::kInfinite, sky.radiance = Vec3(kDefaultSky);
     lights_.push_back(sky);
@@ -74,14 +76,22 @@ void LightSet::add_emitters() {
       found[i].push_back({Vec3(corners[0]), Vec3(u), Vec3(v), Vec3(normal / length), material});
     }
   });
-  for (const auto& of_instance : found) triangles_.insert(triangles_.end(), of_instance.begin(), of_instance.end());
-  std::vector<double> sums;
-  for (const EmittingTriangle& t : triangles_) {
-    const double area = 0.5 * glm::length(glm::cross(DVec3(t.edge_u), DVec3(t.edge_v)));
-    emitted_ += area * static_cast<double>(luminance(source_.materials()[t.material].shading.emission));
-    sums.push_back(emitted_);
+  emitter_of_.assign(instances.size(), kNoEmitter);
+  for (size_t i = 0; i < found.size(); ++i) {
+    if (found[i].empty()) continue;
+    Emitter emitter{triangles_.size(), found[i].size(), 0.0};
+    std::vector<double> sums;
+    for (const EmittingTriangle& t : found[i]) {
+      const double area = 0.5 * glm::length(glm::cross(DVec3(t.edge_u), DVec3(t.edge_v)));
+      emitter.emitted += area * static_cast<double>(luminance(source_.materials()[t.material].shading.emission));
+      sums.push_back(emitter.emitted);
+    }
+    if (!(emitter.emitted > 0.0) || !std::isfinite(emitter.emitted)) continue;
+    for (const double sum : sums) triangle_steps_.push_back(static_cast<float>(sum / emitter.emitted));
+    triangles_.insert(triangles_.end(), found[i].begin(), found[i].end());
+    emitter_of_[i] = static_cast<uint32_t>(emitters_.size());
+    emitters_.push_back(emitter);
   }
-  for (const double sum : sums) triangle_steps_.push_back(static_cast<float>(sum / emitted_));
 }
 
 /// Half of the probability is the same for all lights, half follows their power: bright lights may be far away.
@@ -109,7 +119,7 @@ void LightSet::choose_probabilities() {
           static_cast<double>(luminance(map_of(light) ? light.radiance * map_of(light)->mean() : light.radiance)));
     }
   }
-  if (!triangles_.empty()) powers.push_back(std::numbers::pi * emitted_);
+  for (const Emitter& emitter : emitters_) powers.push_back(std::numbers::pi * emitter.emitted);
   double total = 0.0, sum = 0.0;
   for (const double power : powers) total += power;
   for (const double power : powers) {
@@ -125,15 +135,15 @@ LightSample LightSet::sample(Vec3 position, Vec3 normal, float choice, Vec2 poin
   const auto [light, rest] = find_share(steps_, choice);
   LightSample sample = light < lights_.size()
                            ? sample_light(lights_[light], map_of(lights_[light]), position, normal, point)
-                           : sample_emitter(position, rest, point);
+                           : sample_emitter(emitters_[light - lights_.size()], position, rest, point);
   sample.radiance /= probability_[light];
   sample.density *= probability_[light];
   return sample;
 }
 
-LightSample LightSet::sample_emitter(Vec3 position, float choice, Vec2 point) const {
-  const size_t chosen = find_share(triangle_steps_, choice).first;
-  const EmittingTriangle& t = triangles_[chosen];
+LightSample LightSet::sample_emitter(const Emitter& emitter, Vec3 position, float choice, Vec2 point) const {
+  const auto steps = std::span(triangle_steps_).subspan(emitter.first, emitter.count);
+  const EmittingTriangle& t = triangles_[emitter.first + find_share(steps, choice).first];
   const float root = std::sqrt(point.x);
   const Vec3 place = t.corner + t.edge_u * (1.0f - root) + t.edge_v * (point.y * root);
   const Vec3 way = place - position;
@@ -144,8 +154,8 @@ LightSample LightSet::sample_emitter(Vec3 position, float choice, Vec2 point) co
   const float cosine = -glm::dot(t.normal, direction);
   if (both_sides(material) ? cosine == 0.0f : cosine <= 0.0f) return {};
   LightSample sample{direction, distance, material.shading.emission, 0.0f};
-  // Density of points: luminance / emitted_.
-  const double area_density = static_cast<double>(luminance(material.shading.emission)) / emitted_;
+  // Density of points: luminance / emitted.
+  const double area_density = static_cast<double>(luminance(material.shading.emission)) / emitter.emitted;
   sample.density = static_cast<float>(area_density * static_cast<double>(distance) * static_cast<double>(distance) /
                                       static_cast<double>(std::abs(cosine)));
   sample.radiance /= sample.density;
@@ -202,11 +212,12 @@ float LightSet::background_density(Vec3 direction, Vec3 normal) const {
   return sum;
 }
 
-float LightSet::emitter_density(Vec3 emission, float distance, float cosine) const {
-  if (triangles_.empty() || !(cosine > 0.0f)) return 0.0f;
-  return static_cast<float>(static_cast<double>(probability_.back()) * static_cast<double>(luminance(emission)) /
-                            emitted_ * static_cast<double>(distance) * static_cast<double>(distance) /
-                            static_cast<double>(cosine));
+float LightSet::emitter_density(uint32_t instance, Vec3 emission, float distance, float cosine) const {
+  const uint32_t number = instance < emitter_of_.size() ? emitter_of_[instance] : kNoEmitter;
+  if (number == kNoEmitter || !(cosine > 0.0f)) return 0.0f;
+  const double chosen = static_cast<double>(probability_[lights_.size() + number]) / emitters_[number].emitted;
+  return static_cast<float>(chosen * static_cast<double>(luminance(emission)) * static_cast<double>(distance) *
+                            static_cast<double>(distance) / static_cast<double>(cosine));
 }
 
 } // namespace packtrace

@@ -42,8 +42,9 @@ public:
   /// Density of sample() for the directions of infinite lights.
   float background_density(Vec3 direction, Vec3 normal) const;
   /// Density of sample() for a point on an area light.
+  /// @param instance of the light
   /// @param cosine of the angle between its normal and the direction to it, not negative
-  float emitter_density(Vec3 emission, float distance, float cosine) const;
+  float emitter_density(uint32_t instance, Vec3 emission, float distance, float cosine) const;
 
 private:
   struct EmittingTriangle {
@@ -51,9 +52,14 @@ private:
     Vec3 normal; ///< of the side that emits, unit length
     uint32_t material;
   };
+  /// The emitting triangles of an instance, which are sampled as one light.
+  struct Emitter {
+    size_t first, count; ///< in triangles_
+    double emitted;      ///< sum of area times luminance
+  };
   void add_emitters();
   void choose_probabilities();
-  LightSample sample_emitter(Vec3 position, float choice, Vec2 point) const;
+  LightSample sample_emitter(const Emitter& emitter, Vec3 position, float choice, Vec2 point) const;
   LightSample sample_light(const Light& light, const Environment* map, Vec3 position, Vec3 normal, Vec2 point) const;
   Vec3 radiance_of(const Light& light, const Environment* map, Vec3 direction) const;
   static float density_of(const Light& light, const Environment* map, Vec3 direction, Vec3 normal);
@@ -65,10 +71,11 @@ private:
   std::vector<Light> lights_;
   std::vector<Environment> environments_;
   std::vector<EmittingTriangle> triangles_;
-  std::vector<float> triangle_steps_; ///< cumulative shares of the triangles
-  double emitted_ = 0.0;              ///< sum of area times luminance
-  std::vector<float> probability_;    ///< of each light, then of all triangles together
-  std::vector<float> steps_;          ///< cumulative
+  std::vector<float> triangle_steps_; ///< cumulative shares of each emitter's triangles
+  std::vector<Emitter> emitters_;
+  std::vector<uint32_t> emitter_of_; ///< by instance; empty without emitters
+  std::vector<float> probability_;   ///< of each light, then of each emitter
+  std::vector<float> steps_;         ///< cumulative
   bool uses_sky_ = false;
 };
 

@@ -205,11 +205,11 @@ private:
       return;
     }
     const float cosine = std::abs(glm::dot(vertex.point.geometric, vertex.direction));
-    const float weight =
-        vertex.density > 0.0f
-            ? power_weight(vertex.density,
-                           vertex.light_samples_before * lights_.emitter_density(emission, vertex.distance, cosine))
-            : 1.0f;
+    const float weight = vertex.density > 0.0f
+                             ? power_weight(vertex.density, vertex.light_samples_before *
+                                                                lights_.emitter_density(vertex.point.instance, emission,
+                                                                                        vertex.distance, cosine))
+                             : 1.0f;
     m.pixels[vertex.pixel].specular += vertex.throughput * emission * weight;
   }
 
