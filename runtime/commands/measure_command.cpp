@@ -37,6 +37,7 @@ struct MeasureOptions {
   std::optional<uint32_t> spp, width;
   std::optional<std::string> camera;
   double max_error = 0.005;
+  std::string denoiser = "ours";
   SceneOptions scene;
 
   MatrixMode mode() const { return quick ? MatrixMode::kQuick : full ? MatrixMode::kFull : MatrixMode::kDefault; }
@@ -129,6 +130,7 @@ std::string command_text(const MeasureOptions& options) {
   if (options.spp) words.insert(words.end(), {"--spp", std::to_string(*options.spp)});
   if (options.width) words.insert(words.end(), {"--width", std::to_string(*options.width)});
   if (options.camera) words.insert(words.end(), {"--camera", *options.camera});
+  if (options.denoiser != MeasureOptions().denoiser) words.insert(words.end(), {"--denoiser", options.denoiser});
   for (const std::string& word : scene_words(options.scene)) words.push_back(word);
   return shell_command(words);
 }
@@ -159,6 +161,7 @@ MeasureConfig config_of(const MeasureOptions& options, const GlobalOptions& glob
   runner.spp = options.spp.value_or(std::array{64u, 64u, 256u}[mode]);
   runner.distance_samples = std::array<uint64_t, 3>{50'000, kDefaultDistanceSamples, 1'000'000}[mode];
   runner.diagonal = config.matrix_scene.diagonal;
+  runner.denoiser = options.denoiser;
   return config;
 }
 
@@ -166,7 +169,8 @@ void print_matrix(const MeasureConfig& config) {
   const std::vector<MeasurePoint> points = make_matrix(config.mode, config.matrix_scene, config.runner.spp);
   for (const MeasurePoint& point : points)
     print_printable(fmt::format("{:<32} {:<10} bake {}  render {}\n", point.id, point.group,
-                                shell_command(words_of(point.bake)), shell_command(words_of(point.render))));
+                                shell_command(words_of(point.bake)),
+                                shell_command(render_words(point.render, config.runner))));
   fmt::print("{} points\n", points.size());
 }
 
@@ -246,6 +250,10 @@ void add_measure_command(CLI::App& app, GlobalOptions& globals, const std::strin
       ->type_name("N");
   verb.add_option("--camera", options->camera, "Camera number in the scene, or auto for a view of the whole scene")
       ->type_name("I|auto");
+  verb.add_option("--denoiser", options->denoiser,
+                  "Denoiser of the points that are denoised, as of render: ours or reference (default ours)")
+      ->check(one_of({"ours", "reference"}))
+      ->type_name("NAME");
   verb.add_option(
           "--max-error", options->max_error,
           "Mean absolute error of ambient occlusion that you accept, 0..1 (default 0.005). The report names the "

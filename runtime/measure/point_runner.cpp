@@ -92,6 +92,11 @@ PointRunner::~PointRunner() {
   fs::remove_all(folder_ / "work", ignored);
 }
 
+Words render_words(const RenderKnobs& knobs, const RunnerConfig& config) {
+  const bool other = knobs.denoise && config.denoiser != RunnerConfig().denoiser;
+  return words_of(knobs) + (other ? Words{"--denoiser", config.denoiser} : Words{});
+}
+
 std::string PointRunner::key(const MeasurePoint& point) const {
   return key_of(config_.identity + commands(point).dump() +
                 fmt::format(" {}x{} {} {} {} {} {}", config_.size.width, config_.size.height,
@@ -103,11 +108,11 @@ nlohmann::json PointRunner::commands(const MeasurePoint& point) const {
   const std::string stem = fs::path(config_.scene).stem().string(), file = stem + ".ptk";
   return {{"bake", shell_command(Words{"packtrace", "bake", config_.scene, "-o", file} + words_of(point.bake) +
                                  config_.bake_options + config_.scene_options)},
-          {"render",
-           shell_command(Words{"packtrace", "render", file, "-o", stem + ".exr", "--size",
-                               fmt::format("{}x{}", config_.size.width, config_.size.height)} +
-                         words_of(point.render) + (config_.camera ? Words{"--camera", *config_.camera} : Words{}) +
-                         (config_.seed ? Words{"--seed", std::to_string(config_.seed)} : Words{}))}};
+          {"render", shell_command(Words{"packtrace", "render", file, "-o", stem + ".exr", "--size",
+                                         fmt::format("{}x{}", config_.size.width, config_.size.height)} +
+                                   render_words(point.render, config_) +
+                                   (config_.camera ? Words{"--camera", *config_.camera} : Words{}) +
+                                   (config_.seed ? Words{"--seed", std::to_string(config_.seed)} : Words{}))}};
 }
 
 /// Runs a command and returns its JSON, with the time of the process added. Throws StageFailure.
@@ -132,7 +137,7 @@ nlohmann::json PointRunner::render(const std::string& stage, const std::string& 
 }
 
 nlohmann::json PointRunner::make_reference() {
-  const Words options = words_of(reference_knobs(config_.spp)) + config_.scene_options;
+  const Words options = render_words(reference_knobs(config_.spp), config_) + config_.scene_options;
   const auto command = [&](uint64_t seed) {
     return shell_command(Words{"packtrace", "render", config_.scene, "-o", "float.exr", "--size",
                                fmt::format("{}x{}", config_.size.width, config_.size.height), "--seed",
@@ -232,7 +237,7 @@ void PointRunner::add_file_values(nlohmann::json& point) const {
 void PointRunner::add_render_values(nlohmann::json& point, const MeasurePoint& what) {
   const std::string file = folder_ / "work/point.ptk";
   const fs::path image = folder_.image(key(what));
-  const Json r = render("render", file, image, config_.seed, words_of(what.render) + Words{"--aov", "ao"});
+  const Json r = render("render", file, image, config_.seed, render_words(what.render, config_) + Words{"--aov", "ao"});
   const auto at = [&](const char* path) { return r.at(Json::json_pointer(path)).get<double>(); };
   const double frames = what.render.frames, open = at("/seconds/load"), bvh = at("/seconds/bvh");
   point["resident_bytes"] = r.at("/resident_bytes/tracing"_json_pointer);
@@ -256,8 +261,8 @@ void PointRunner::add_render_values(nlohmann::json& point, const MeasurePoint& w
   if (config_.embree_beside_each_point && what.render.backend == "packed" && !what.render.lod_error_px) {
     RenderKnobs embree = what.render;
     embree.backend = "embree";
-    const Json e =
-        render("embree", file, folder_ / "work/embree.exr", config_.seed, words_of(embree) + Words{"--aov", "ao"});
+    const Json e = render("embree", file, folder_ / "work/embree.exr", config_.seed,
+                          render_words(embree, config_) + Words{"--aov", "ao"});
     const double camera = e.at("/mrays_per_s/primary"_json_pointer).get<double>(),
                  ao = e.at("/mrays_per_s/ao"_json_pointer).get<double>();
     point["embree"] = {{"camera", camera}, {"ao", ao}};
@@ -334,24 +339,26 @@ nlohmann::json PointRunner::load_or_fill(const std::string& kind, const BakeKnob
 
 nlohmann::json PointRunner::convergence(const BakeKnobs& bake_knobs, const std::vector<uint32_t>& frames) {
   const fs::path image = folder_ / "work/frames.exr";
-  return load_or_fill("convergence", bake_knobs, frames.size(), [&](Json& curve) {
-    for (const uint32_t count : frames) {
-      Json entry{{"frames", count}, {"spp", 1}};
-      for (const bool denoise : {false, true}) {
-        RenderKnobs knobs;
-        knobs.frames = count, knobs.denoise = denoise;
-        const Json r = render("render", folder_ / "work/point.ptk", image, config_.noise_seed,
-                              words_of(knobs) + Words{"--aov", "ao"});
-        Json& ao = entry[denoise ? "denoised" : "noisy"];
-        ao = ao_error(read_ao(image), *reference_);
-        add_noise_ratio(ao);
-        entry["ms_per_frame"]["ao"] = r.at("/seconds/ao"_json_pointer).get<double>() * 1e3 / count;
-        if (denoise)
-          entry["ms_per_frame"]["denoise"] = r.at("/seconds/denoise"_json_pointer).get<double>() * 1e3 / count;
-      }
-      curve.push_back(entry);
-    }
-  });
+  return load_or_fill(config_.denoiser == "ours" ? "convergence" : "convergence-" + config_.denoiser, bake_knobs,
+                      frames.size(), [&](Json& curve) {
+                        for (const uint32_t count : frames) {
+                          Json entry{{"frames", count}, {"spp", 1}};
+                          for (const bool denoise : {false, true}) {
+                            RenderKnobs knobs;
+                            knobs.frames = count, knobs.denoise = denoise;
+                            const Json r = render("render", folder_ / "work/point.ptk", image, config_.noise_seed,
+                                                  render_words(knobs, config_) + Words{"--aov", "ao"});
+                            Json& ao = entry[denoise ? "denoised" : "noisy"];
+                            ao = ao_error(read_ao(image), *reference_);
+                            add_noise_ratio(ao);
+                            entry["ms_per_frame"]["ao"] = r.at("/seconds/ao"_json_pointer).get<double>() * 1e3 / count;
+                            if (denoise)
+                              entry["ms_per_frame"]["denoise"] =
+                                  r.at("/seconds/denoise"_json_pointer).get<double>() * 1e3 / count;
+                          }
+                          curve.push_back(entry);
+                        }
+                      });
 }
 
 nlohmann::json PointRunner::resolution(const BakeKnobs& bake_knobs, const std::vector<uint32_t>& samples) {
@@ -367,7 +374,7 @@ nlohmann::json PointRunner::resolution(const BakeKnobs& bake_knobs, const std::v
       RenderKnobs knobs;
       knobs.spp = spp, knobs.ao_resolution = resolution;
       const Json r = render("render", folder_ / "work/point.ptk", image, config_.noise_seed,
-                            words_of(knobs) + Words{"--aov", "ao"});
+                            render_words(knobs, config_) + Words{"--aov", "ao"});
       Json ao = ao_error(read_ao(image), *reference_);
       add_noise_ratio(ao);
       table.push_back({{"ao_resolution", resolution},

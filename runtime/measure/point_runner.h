@@ -29,8 +29,12 @@ struct RunnerConfig {
   uint64_t seed = 0, noise_seed = 1;
   uint64_t distance_samples = 200'000;
   bool embree_beside_each_point = true;
-  double diagonal = 0.0; ///< of the scene, world units
+  double diagonal = 0.0;         ///< of the scene, world units
+  std::string denoiser = "ours"; ///< --denoiser of points that are denoised
 };
+
+/// Options of render for the knobs, with the denoiser if they use one.
+Words render_words(const RenderKnobs& knobs, const RunnerConfig& config);
 
 /// A stage of a point that did not succeed.
 struct StageFailure {

@@ -79,6 +79,24 @@ TEST(Measure, StopsAtAFullDiskAndContinues) {
   EXPECT_EQ(run_packtrace(words).exit_code, 0);
 }
 
+TEST(Measure, DenoisesWithTheChosenPreset) {
+  const Workbench bench;
+  const auto errors = [&](const std::vector<std::string>& options) {
+    const CommandResult result = measure(bench, options);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::vector<double> mae;
+    const Json report = Json::parse(read_text(bench / "report/report.json"));
+    for (const Json& entry : report["convergence"]) mae.push_back(entry["denoised"]["mae"]);
+    return mae;
+  };
+  const std::vector<double> ours = errors({}), reference = errors({"--denoiser", "reference"});
+  EXPECT_NE(ours, reference);
+  EXPECT_EQ(errors({"--denoiser", "ours"}), ours) << "both remain in the folder";
+  const CommandResult matrix = run_packtrace({"measure", bench.scene(), "--matrix", "--denoiser", "reference"});
+  EXPECT_NE(matrix.out.find("--frames 8 --spp 1 --denoiser reference"), std::string::npos) << matrix.out;
+  EXPECT_EQ(measure(bench, {"--denoiser", "off"}).exit_code, 2);
+}
+
 TEST(Measure, ListsItsPointsWithoutRunningThem) {
   const Workbench bench;
   const CommandResult result = run_packtrace({"measure", bench.scene(), "--matrix"});
