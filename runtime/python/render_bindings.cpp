@@ -1,6 +1,7 @@
 // Rendering to numpy arrays.
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -87,6 +88,17 @@ void set_ao(StillConfig& config, const AoChoice& choice) {
     assign_setting(ao_settings(), name + "=" + setting_text(value), config.ao, "ambient occlusion");
 }
 
+/// What is rendered; settings by name, as `packtrace render --shade-set`.
+void set_shading(StillConfig& config, const std::string& view, const std::map<std::string, double>& settings) {
+  constexpr std::array<std::pair<const char*, FrameView>, 3> kViews{
+      {{"ao", FrameView::kAo}, {"pbr", FrameView::kPbr}, {"pbr+ao", FrameView::kPbrAo}}};
+  config.view = value_of(kViews, view, "view");
+  if (!config.shades() && !settings.empty())
+    throw Error(ErrorKind::kUsage, "shade_settings change nothing with view=\"ao\"");
+  for (const auto& [name, value] : settings)
+    assign_setting(shade_settings(), name + "=" + setting_text(value), config.shade, "shading");
+}
+
 /// Whether a layer is one of those that FrameConfig::view_layers fills.
 bool is_view(const std::string& layer) {
   return std::ranges::find(kTracedViews, layer) != kTracedViews.end() ||
@@ -108,6 +120,7 @@ py::dict arrays_of(RenderedImage&& image) {
   const auto add_view = [&](const char* name, auto& values) {
     if (!values.empty()) all[name] = pixels(std::move(values), size);
   };
+  add_view("pbr", image.pbr), add_view("direct", image.direct), add_view("specular", image.specular);
   add_view("hit_distance", image.hit_distance), add_view("motion", image.motion);
   add_view("previous_depth", image.previous_depth), add_view("local_variance", image.local_variance);
   add_view("variance", image.variance), add_view("history", image.history);
@@ -130,7 +143,8 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
                 const std::string& denoiser, const std::map<std::string, double>& denoiser_settings,
                 const std::optional<std::vector<std::string>>& layers, std::optional<float> ao_radius,
                 const std::string& ao_resolution, const std::string& ao_rate, const std::string& ao_sampler,
-                const std::map<std::string, double>& ao_settings, const std::string& backend, uint64_t seed) {
+                const std::map<std::string, double>& ao_settings, const std::string& view,
+                const std::map<std::string, double>& shade_settings, const std::string& backend, uint64_t seed) {
   RenderedImage image;
   {
     const py::gil_scoped_release release;
@@ -146,6 +160,7 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     config.ao.spp = spp;
     config.ao.seed = seed;
     set_ao(config, {ao_radius, ao_resolution, ao_rate, ao_sampler, ao_settings});
+    set_shading(config, view, shade_settings);
     config.validate();
     TracerConfig tracing;
     tracing.backend = chosen_backend(backend);
@@ -165,7 +180,8 @@ void bind_rendering(py::module_& module) {
              py::arg("denoiser") = "ours", py::arg("denoiser_settings") = std::map<std::string, double>(),
              py::arg("layers") = py::none(), py::arg("ao_radius") = py::none(), py::arg("ao_resolution") = "full",
              py::arg("ao_rate") = "full", py::arg("ao_sampler") = "net",
-             py::arg("ao_settings") = std::map<std::string, double>(), py::arg("backend") = "packed",
+             py::arg("ao_settings") = std::map<std::string, double>(), py::arg("view") = "ao",
+             py::arg("shade_settings") = std::map<std::string, double>(), py::arg("backend") = "packed",
              py::arg("seed") = 0);
 }
 

@@ -83,6 +83,8 @@ def render(
     ao_rate: Literal["full", "checkerboard", "adaptive"] = ...,
     ao_sampler: Literal["net", "sobol", "jitter", "lattice", "independent"] = ...,
     ao_settings: Mapping[str, float] = ...,
+    view: Literal["ao", "pbr", "pbr+ao"] = ...,
+    shade_settings: Mapping[str, float] = ...,
     backend: Literal["packed", "embree"] = ...,
     seed: int = ...,
 ) -> dict[str, NDArray[Any]]:
@@ -97,5 +99,7 @@ def render(
 
     size is (width, height), by default the camera's. camera counts from 0; None frames the whole scene, as for files
     without cameras. ao_radius is in world units, by default a tenth of the scene's diagonal. ao_resolution, ao_rate and
-    ao_sampler are those of `packtrace help render`, ao_settings those of docs/ambient_occlusion.md. Raises Error.
+    ao_sampler are those of `packtrace help render`, ao_settings those of docs/ambient_occlusion.md.
+    With view "pbr" or "pbr+ao", of files baked for shading, there are also pbr, direct and specular; shade_settings are
+    those of docs/shading.md. Raises Error.
     """

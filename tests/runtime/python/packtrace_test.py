@@ -140,6 +140,31 @@ class Module(unittest.TestCase):
                 view(**option)
             self.assertEqual(caught.exception.kind, "usage", option)
 
+    def test_views_can_be_shaded(self):
+        scene, path = self.path.parent / "lit.pbrt", self.path.parent / "lit.ptk"
+        scene.write_text("LookAt 0 1 -4 0 0 0 0 1 0 Camera \"perspective\" WorldBegin LightSource \"point\" "
+                         "\"point from\" [0 3 -2] Shape \"sphere\" WorldEnd\n")
+        packtrace.bake(scene, path, purpose="shading", force=True)
+        file = packtrace.open(path)
+
+        def view(**options):
+            return packtrace.render(file, size=(64, 36), frames=2, **options)
+
+        shaded = view(view="pbr+ao")
+        self.assertEqual(shaded["pbr"].shape, (36, 64, 3))
+        self.assertGreater(shaded["direct"].max(), 0)
+        self.assertNotIn("pbr", view())
+        brighter = view(view="pbr+ao", shade_settings={"ambient": 2})
+        self.assertGreater(brighter["pbr"].sum(), shaded["pbr"].sum())
+        for option in ({"view": "x"}, {"shade_settings": {"depth": 1}}, {"view": "pbr", "shade_settings": {"x": 1}}):
+            with self.assertRaises(packtrace.Error) as caught:
+                view(**option)
+            self.assertEqual(caught.exception.kind, "usage", option)
+        packtrace.bake(scene, path, force=True)
+        with self.assertRaises(packtrace.Error) as caught:
+            packtrace.render(packtrace.open(path), size=(64, 36), view="pbr")
+        self.assertEqual(caught.exception.kind, "unsupported")
+
     def test_other_threads_run_meanwhile(self):
         file = packtrace.open(self.path)
         turns, done = 0, threading.Event()
