@@ -72,7 +72,7 @@ private:
     write_rays(now_, space_, batch.count, c);
     for (uint32_t i = 0; i < batch.count; ++i) {
       CameraRay ray{c.origin.at(i), c.direction.at(i)};
-      const bool traced = approach(ray) && c.x[i] < tile.x1 && c.y[i] < tile.y1;
+      const bool traced = approach_scene(ray) && c.x[i] < tile.x1 && c.y[i] < tile.y1;
       c.origin.set(i, ray.origin);
       batch.rays[i] = {Vec3(ray.origin), 0.0f, Vec3(ray.direction),
                        traced ? std::numeric_limits<float>::infinity() : -1.0f};
@@ -137,21 +137,6 @@ private:
     if (motion_.any()) motion_.move_with_camera(batch.count, c);
   }
 
-  /// Moves the origin of a ray that starts far away to just before the scene: floats resolve the scene there, and
-  /// Embree accepts origins up to 1.8e18 only. Returns false, with a harmless ray, if the ray misses the scene.
-  static bool approach(CameraRay& ray) {
-    constexpr double kNear = 4.0 * UnitSpace::kHalfSize; // the corners of the scene's box lie within sqrt(3) kHalfSize
-    if (glm::dot(ray.origin, ray.origin) <= kNear * kNear) return true;
-    const double closest = -glm::dot(ray.origin, ray.direction);
-    const DVec3 point = ray.origin + ray.direction * closest;
-    if (closest > 0.0 && glm::dot(point, point) <= kNear * kNear) {
-      ray.origin = point - ray.direction * kNear;
-      return true;
-    }
-    ray.origin = DVec3(0.0);
-    return false;
-  }
-
   void write_miss(size_t pixel) const {
     out_.view_z[pixel] = 0.0f;
     out_.position[pixel] = out_.geometric_normal[pixel] = out_.normal[pixel] = out_.albedo[pixel] = Vec3(0);
@@ -205,6 +190,19 @@ private:
 };
 
 } // namespace
+
+bool approach_scene(CameraRay& ray) {
+  constexpr double kNear = 4.0 * UnitSpace::kHalfSize; // the corners of the scene's box lie within sqrt(3) kHalfSize
+  if (glm::dot(ray.origin, ray.origin) <= kNear * kNear) return true;
+  const double closest = -glm::dot(ray.origin, ray.direction);
+  const DVec3 point = ray.origin + ray.direction * closest;
+  if (closest > 0.0 && glm::dot(point, point) <= kNear * kNear) {
+    ray.origin = point - ray.direction * kNear;
+    return true;
+  }
+  ray.origin = DVec3(0.0);
+  return false;
+}
 
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress) {

@@ -26,6 +26,11 @@ public:
                                                  glm::dvec2 barycentrics) const = 0;
 };
 
+/// Moves the origin of a ray that starts far away to just before the scene: floats resolve the scene there, and Embree
+/// accepts origins up to 1.8e18 only. Returns false, with a harmless ray, if the ray misses the scene.
+/// @param ray of unit space
+bool approach_scene(CameraRay& ray);
+
 /// What motion is measured against. Everything referred to must live until trace_primary() returns.
 struct PreviousFrame {
   const PrimaryCamera& camera; ///< the previous frame's

@@ -25,10 +25,10 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
           "--aov", options.aovs,
           "Layers to write, separated by commas. ao is denoised, ao_raw is the last frame before denoising, shaded is "
           "albedo times ao; others are depth, normal, instance, albedo (default: these in .exr, ao in .png), the views "
-          "hit_distance, motion, previous_depth, local_variance, variance, history and disocclusion "
-          "(docs/command_line.md), with --lod-error lod and lod-error, with --view pbr and pbr+ao pbr (the default in "
-          ".png), "
-          "direct and specular, and all. Several layers in .png become "
+          "hit_distance, motion, previous_depth, local_variance, variance, history and disocclusion, "
+          "the surfaces' material_flags and cluster, what camera rays cost: visited_nodes, visited_leaves and "
+          "tested_triangles (docs/command_line.md), with --lod-error lod and lod-error, with --view pbr and pbr+ao pbr "
+          "(the default in .png), direct and specular, and all but the costs. Several layers in .png become "
           "NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");

@@ -48,10 +48,13 @@ RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& glob
   config = make_config(*loaded.source, camera.camera, options, detail);
   config.lod_layers = has_lod_layer(layers);
   config.view_layers = has_view_layer(layers);
+  config.surface_layers = has_surface_layer(layers), config.cost_layers = has_cost_layer(layers);
   pixels = reserve_picture(options, config, globals.memory);
   const BakedFile* const file = loaded.baked ? &*loaded.baked : nullptr;
-  const FrameScene scene{loaded.source.get(), file, tracer_config(options, globals, file != nullptr),
-                         motion.moves() ? &motion : nullptr, shows_motion(options)};
+  const TracerConfig backend = tracer_config(options, globals, file != nullptr);
+  if (config.cost_layers && backend.backend != Backend::kPacked)
+    throw Error(ErrorKind::kUsage, "--aov visited_nodes and the like require --backend packed");
+  const FrameScene scene{loaded.source.get(), file, backend, motion.moves() ? &motion : nullptr, shows_motion(options)};
   loop = std::make_unique<FrameLoop>(scene, config);
 }
 

@@ -57,8 +57,10 @@ struct FrameConfig {
   bool jitter = true;
   AoResolution ao_resolution = AoResolution::kFull;
   AoRate ao_rate = AoRate::kFull;
-  bool lod_layers = false;  ///< fill the LOD layers of RenderedImage
-  bool view_layers = false; ///< fill its views of intermediate results
+  bool lod_layers = false;     ///< fill the LOD layers of RenderedImage
+  bool view_layers = false;    ///< fill its views of intermediate results
+  bool surface_layers = false; ///< fill its material flags and clusters
+  bool cost_layers = false;    ///< fill what its camera rays visit; needs the packed tracer
   FrameView view = FrameView::kAo;
   ShadeConfig shade; ///< of the other views
   AoConfig ao;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string>
 #include <string_view>
 
 #include "pbrt_import/base/error.h"
@@ -10,7 +11,9 @@
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/frame/surface_layers.h"
 #include "runtime/stopwatch.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -331,6 +334,21 @@ void FrameLoop::resolve_views(RenderedImage& image) {
   views_.clear();
 }
 
+/// Writes the layers about the camera rays' surfaces and costs.
+void FrameLoop::resolve_surfaces(RenderedImage& image) const {
+  if (config_.surface_layers) write_surface_layers(config_, gbuffer_, *scene().source, state_.camera_source(), image);
+  if (!config_.cost_layers) return;
+  const auto* packed = dynamic_cast<const PackedTracer*>(tracers().front());
+  if (packed == nullptr)
+    throw Error(ErrorKind::kUnsupported, std::string(kCostLayers[0]) + " and other costs require backend packed");
+  write_cost_layers(config_, count_ray_costs(*packed, *traced_view_), image);
+}
+
+void FrameLoop::show_layers(const FrameConfig& config) {
+  config_.view_layers = config.view_layers;
+  config_.surface_layers = config.surface_layers, config_.cost_layers = config.cost_layers;
+}
+
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   PassTimes& times = report.times;
   const std::vector<float> ao = accumulated_ao(report);
@@ -351,6 +369,7 @@ void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   if (config_.view_layers) resolve_views(image);
   image.max_lod_error_px = config_.detail.error_px.value_or(0.0);
   image.lod = lod_layers_.lod, image.cluster = lod_layers_.cluster, image.lod_error = lod_layers_.lod_error;
+  resolve_surfaces(image);
 }
 
 } // namespace packtrace

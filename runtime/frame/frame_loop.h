@@ -42,6 +42,7 @@ public:
   const FrameReport& next_frame(const Camera& camera, double time_s, Progress& progress);
 
   /// Writes the layers of the frames so far.
+  /// Throws Error(kUnsupported) for FrameConfig::cost_layers without the packed tracer.
   /// @param report mean_history is set, and the denoiser's and the resolve's times are added
   void resolve(RenderedImage& image, PictureReport& report);
 
@@ -55,8 +56,8 @@ public:
   /// Goes on with other settings, whose `detail` is not read: levels of detail stay as they are. All frames are
   /// forgotten; trees are kept. Throws as the constructor does.
   void configure(const FrameConfig& config);
-  /// Sets FrameConfig::view_layers, from the next frame on. Forgets nothing.
-  void show_views(bool shown) { config_.view_layers = shown; }
+  /// Sets which of the views, surface and cost layers are filled, from the next frame on. Forgets nothing.
+  void show_layers(const FrameConfig& config);
 
   /// Number of occlusion pixels per frame.
   uint64_t frame_pixels() const;
@@ -84,6 +85,7 @@ private:
   void shade_frame(Progress& progress);
   std::vector<float> accumulated_ao(PictureReport& report);
   void resolve_views(RenderedImage& image);
+  void resolve_surfaces(RenderedImage& image) const;
 
   FrameConfig config_;
   SceneState state_;

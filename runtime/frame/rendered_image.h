@@ -36,6 +36,11 @@ struct RenderedImage {
   std::vector<float> variance;       ///< of the mean that is denoised (DenoisedAo::variance)
   std::vector<float> history;        ///< frames of history (DenoisedAo::tspp)
   std::vector<float> disocclusion;   ///< 1 where the history began after the last movement
+  // Of the last frame's camera rays; empty unless FrameConfig::surface_layers is set, then `cluster` is set, too.
+  std::vector<uint32_t> material_flags; ///< bits of MaterialFlags
+  // The costs are empty unless FrameConfig::cost_layers is set. They count for rays that miss, too.
+  std::vector<float> visited_nodes, visited_leaves; ///< of all trees, by a camera ray that is traced alone
+  std::vector<float> tested_triangles;              ///< the same
   // The LOD layers are empty unless FrameConfig::lod_layers is set.
   std::vector<uint32_t> lod;     ///< LOD level at the last camera ray that hits
   std::vector<uint32_t> cluster; ///< cluster number at the last camera ray that hits

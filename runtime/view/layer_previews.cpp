@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "pbrt_import/scene/material_flag_names.h"
 #include "runtime/image/false_color.h"
 #include "runtime/image/legend.h"
+#include "runtime/view/layers.h"
 
 namespace packtrace {
 namespace {
@@ -52,6 +55,8 @@ Image plain_preview(const RenderedImage& image, const std::string& aov) {
   if (aov == "depth") return depth_preview(image.size, image.depth);
   if (aov == "normal") return normal_preview(image.size, image.normal);
   if (aov == "instance") return id_preview(image.size, image.instance);
+  if (aov == "cluster") return id_preview(image.size, image.cluster);
+  if (aov == "material_flags") return id_preview(image.size, image.material_flags);
   if (aov == "lod") return level_preview(image.size, image.lod, image.cluster, image.ao);
   if (aov == "lod-error") return heat_map(image.size, image.lod_error, static_cast<float>(image.max_lod_error_px));
   if (aov == "motion") return vector_preview(image.size, image.motion, longest_motion(image));
@@ -90,6 +95,21 @@ Legend motion_legend(const RenderedImage& image) {
           {{0.0f, "right"}, {0.25f, "down"}, {0.5f, "left"}, {0.75f, "up"}, {1.0f, "right"}}};
 }
 
+/// The combinations of flags that cover most pixels.
+Legend flags_legend(const RenderedImage& image) {
+  constexpr size_t kMostBands = 6;
+  std::map<uint32_t, size_t> pixels;
+  for (size_t i = 0; i < image.material_flags.size(); ++i)
+    if (image.coverage[i] > 0.0f) ++pixels[image.material_flags[i]];
+  std::vector<std::pair<uint32_t, size_t>> sorted(pixels.begin(), pixels.end());
+  std::ranges::stable_sort(sorted, std::greater<>(), &std::pair<uint32_t, size_t>::second);
+  sorted.resize(std::min(sorted.size(), kMostBands));
+  if (sorted.empty()) sorted.emplace_back(0, 0);
+  std::vector<std::pair<Vec3, std::string>> bands;
+  for (const auto& [flags, count] : sorted) bands.emplace_back(id_color(flags), material_flag_words(flags));
+  return banded_legend("material flags", bands);
+}
+
 /// The legend of a view that is one number per pixel.
 Legend view_legend(const std::string& aov, const std::vector<float>& values) {
   static const std::map<std::string, const char*> kTitles{
@@ -98,7 +118,10 @@ Legend view_legend(const std::string& aov, const std::vector<float>& values) {
       {"local_variance", "variance of the samples in 7 x 7 pixels"},
       {"variance", "variance of the mean occlusion"},
       {"history", "history, frames"},
-      {"disocclusion", "1: the history began with the last movement"}};
+      {"disocclusion", "1: the history began with the last movement"},
+      {"visited_nodes", "nodes that a camera ray visits"},
+      {"visited_leaves", "leaves that a camera ray visits"},
+      {"tested_triangles", "triangles that a camera ray tests"}};
   const auto end = static_cast<double>(scale_end(values));
   return {kTitles.at(aov), scalar_color, even_ticks([end](float t) { return end * static_cast<double>(t); })};
 }
@@ -111,6 +134,9 @@ const std::vector<float>* view_of(const RenderedImage& image, const std::string&
   if (aov == "local_variance") return &image.local_variance;
   if (aov == "variance") return &image.variance;
   if (aov == "history") return &image.history;
+  if (aov == "visited_nodes") return &image.visited_nodes;
+  if (aov == "visited_leaves") return &image.visited_leaves;
+  if (aov == "tested_triangles") return &image.tested_triangles;
   return aov == "disocclusion" ? &image.disocclusion : nullptr;
 }
 
@@ -122,12 +148,14 @@ Image layer_preview(const RenderedImage& image, const std::string& aov, const Pr
   const bool picture = aov == "albedo" || aov == "shaded";
   const Background usual =
       picture ? Background{Background::Kind::kSky, Vec3(0)} : Background{Background::Kind::kColor, kDefaultBackground};
-  Image preview = over_background(plain_preview(image, aov), image.coverage, style.background.value_or(usual));
+  Image preview = plain_preview(image, aov);
+  if (!has_cost_layer({aov})) preview = over_background(preview, image.coverage, style.background.value_or(usual));
   if (!style.legend) return preview;
   if (aov == "depth") return with_legend(preview, depth_legend(image));
   if (aov == "lod") return with_legend(preview, level_legend(image));
   if (aov == "lod-error") return with_legend(preview, error_legend(image.max_lod_error_px));
   if (aov == "motion") return with_legend(preview, motion_legend(image));
+  if (aov == "material_flags") return with_legend(preview, flags_legend(image));
   if (const std::vector<float>* view = view_of(image, aov)) return with_legend(preview, view_legend(aov, *view));
   return preview;
 }

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/frame/surface_layers.h"
 #include "runtime/frame/view_layers.h"
 #include "runtime/view/layer_previews.h"
 
@@ -48,6 +49,8 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   if (aov == "normal") return {aov, xyz, floats_of(image.normal), true};
   if (aov == "instance") return {aov, {""}, std::span<const uint32_t>(image.instance)};
   if (aov == "lod") return {aov, {""}, std::span<const uint32_t>(image.lod)};
+  if (aov == "material_flags") return {aov, {""}, std::span<const uint32_t>(image.material_flags)};
+  if (aov == "cluster") return {aov, {""}, std::span<const uint32_t>(image.cluster)};
   if (aov == "lod-error") return {aov, {""}, std::span<const float>(image.lod_error)};
   if (aov == "motion") return {aov, {"X", "Y"}, motion_floats(image.motion)};
   if (const std::vector<float>* view = view_of(image, aov)) return {aov, {""}, std::span<const float>(*view)};
@@ -62,7 +65,10 @@ std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, Ava
   if (aovs.empty()) return {available.shaded ? "pbr" : "ao"};
   if (contains(aovs, "all")) {
     std::vector<std::string> names = result_layers(available);
-    if (available.views) names.insert(names.end(), kTracedViews.begin(), kTracedViews.end());
+    if (available.views) {
+      names.insert(names.end(), kTracedViews.begin(), kTracedViews.end());
+      names.insert(names.end(), kSurfaceLayers.begin(), kSurfaceLayers.end());
+    }
     if (available.denoiser) names.insert(names.end(), kDenoiserViews.begin(), kDenoiserViews.end());
     return names;
   }
@@ -95,6 +101,14 @@ bool has_shaded_layer(const std::vector<std::string>& layers) {
   return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kShadedLayers, layer); });
 }
 
+bool has_surface_layer(const std::vector<std::string>& layers) {
+  return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kSurfaceLayers, layer); });
+}
+
+bool has_cost_layer(const std::vector<std::string>& layers) {
+  return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kCostLayers, layer); });
+}
+
 bool has_lod_layer(const std::vector<std::string>& layers) {
   return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kLodLayers, layer); });
 }
@@ -105,6 +119,8 @@ const std::vector<std::string>& aov_names() {
     names.insert(names.end(), kShadedLayers.begin(), kShadedLayers.end());
     names.insert(names.end(), kTracedViews.begin(), kTracedViews.end());
     names.insert(names.end(), kDenoiserViews.begin(), kDenoiserViews.end());
+    names.insert(names.end(), kSurfaceLayers.begin(), kSurfaceLayers.end());
+    names.insert(names.end(), kCostLayers.begin(), kCostLayers.end());
     names.insert(names.end(), kLodLayers.begin(), kLodLayers.end());
     return names;
   }();

@@ -19,7 +19,8 @@ struct AvailableLayers {
 /// Names of the layers that a render can write.
 const std::vector<std::string>& aov_names();
 
-/// Returns the layers to write, without repetitions. Throws Error(kUsage) for unknown layers.
+/// Returns the layers to write, without repetitions; "all" are those that cost little. Throws Error(kUsage) for unknown
+/// layers.
 /// @param aovs layers from aov_names(), or "all"; empty: "pbr" of shaded images, else "ao"
 std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, AvailableLayers available);
 
@@ -33,6 +34,10 @@ bool has_denoiser_layer(const std::vector<std::string>& layers);
 
 /// Whether one of the layers needs a shaded image.
 bool has_shaded_layer(const std::vector<std::string>& layers);
+
+/// Whether one of the layers is one of kSurfaceLayers, and of kCostLayers (runtime/frame/surface_layers.h).
+bool has_surface_layer(const std::vector<std::string>& layers);
+bool has_cost_layer(const std::vector<std::string>& layers);
 
 /// A layer of an .exr file, which refers to the image.
 /// @param aov one of aov_names()

@@ -32,7 +32,7 @@ bool PaneRenderer::fits(const ViewFile& file, bool played) const {
 
 bool PaneRenderer::configure(const FrameConfig& config) {
   if (same_frames(loop_->config(), config)) {
-    loop_->show_views(config.view_layers);
+    loop_->show_layers(config);
     return false;
   }
   config.validate();

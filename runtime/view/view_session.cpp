@@ -77,6 +77,8 @@ void ViewSession::require_layer(const PaneState& pane) const {
     throw Error(ErrorKind::kUsage, "no such view: " + pane.layer + did_you_mean_text(closest_name(pane.layer, known)));
   }
   require_view(!has_denoiser_layer({pane.layer}) || pane.config.denoise, pane.layer + " requires a denoiser");
+  require_view(!has_cost_layer({pane.layer}) || files_[pane.file].at_rest.backend.backend == Backend::kPacked,
+               pane.layer + " requires --backend packed");
   require_view(!has_lod_layer({pane.layer}) || pane.config.detail.camera_uses_levels(),
                pane.layer + " requires --lod-error, and --lod-rays all");
 }
@@ -163,8 +165,12 @@ FrameConfig ViewSession::frame_config(const PaneState& pane, uint32_t quality) c
   config.size = size_;
   config.lod_layers = config.detail.camera_uses_levels();
   config.ao.radius = ao_radius(config.ao, files_[pane.file].at_rest.source->world_bounds());
-  for (size_t i = 0; i < shown_panes(); ++i)
-    config.view_layers = config.view_layers || keep_views_ || has_view_layer({panes_[i].layer});
+  for (size_t i = 0; i < shown_panes(); ++i) {
+    const std::vector<std::string> layer{panes_[i].layer};
+    config.view_layers = config.view_layers || keep_views_ || has_view_layer(layer);
+    config.surface_layers = config.surface_layers || has_surface_layer(layer);
+    config.cost_layers = config.cost_layers || has_cost_layer(layer);
+  }
   return at_quality_step(config, quality);
 }
 

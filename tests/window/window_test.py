@@ -19,7 +19,8 @@ from viewer import PATIENCE_S, Display, Viewer, wait_until
 
 PROGRAM, SOURCES = "", ""
 VIEWS = ["ao", "ground_truth", "ao_raw", "depth", "normal", "instance", "albedo", "shaded", "hit_distance", "motion",
-         "previous_depth", "local_variance", "variance", "history", "disocclusion"]
+         "previous_depth", "local_variance", "variance", "history", "disocclusion", "material_flags", "cluster",
+         "visited_nodes", "visited_leaves", "tested_triangles"]
 
 
 def scene(name):

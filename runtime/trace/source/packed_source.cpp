@@ -37,7 +37,8 @@ Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycen
 }
 
 PackedSource::PackedSource(const BakedFile& file)
-    : file_(file), materials_(file.materials()), shading_(file.shading()), cameras_(file.cameras()), world_bounds_(file.world_bounds()) {
+    : file_(file), materials_(file.materials()), shading_(file.shading()), cameras_(file.cameras()),
+      world_bounds_(file.world_bounds()) {
   instances_.reserve(file.instances().size());
   for (uint32_t i = 0; i < file.instances().size(); ++i)
     instances_.push_back({file.instances()[i].geometry, file.world_from_object(i)});
@@ -91,6 +92,14 @@ float PackedSource::position_error(uint32_t geometry) const {
   const double bound = file_.geometries()[geometry].position_error_bound;
   const auto rounded = static_cast<float>(bound);
   return rounded >= bound ? rounded : std::nextafter(rounded, std::numeric_limits<float>::infinity());
+}
+
+SurfaceDetail PackedSource::detail_of(uint32_t instance, uint32_t triangle) const {
+  const uint32_t geometry = instances_[instance].geometry;
+  SurfaceDetail detail;
+  detail.cluster =
+      static_cast<uint32_t>(file_.geometries()[geometry].first_cluster) + file_.cluster_of_triangle(geometry, triangle);
+  return detail;
 }
 
 TextureView PackedSource::texture(uint32_t index) const { return file_.texture(index); }

@@ -44,6 +44,7 @@ public:
   void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const override;
   Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   float position_error(uint32_t geometry) const override;
+  SurfaceDetail detail_of(uint32_t instance, uint32_t triangle) const override;
   std::span<const PlacedGeometry> instances() const override { return instances_; }
   std::span<const Material> materials() const override { return materials_; }
   AlphaMaskView mask(uint32_t index) const override;
