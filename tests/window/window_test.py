@@ -452,6 +452,15 @@ class Size(WindowTest):
         self.expect_bytes_of_render(command, files)
         self.end(viewer)
 
+    def test_pictures_that_need_too_much_memory_are_refused(self):
+        viewer = self.open(self.file("room"), "--max-memory", "60M")
+        viewer.resize(1000, 700)
+        viewer.message("memory")
+        viewer.resize(200, 100)
+        wait_until("a smaller picture", lambda: " 200 x 100 " in viewer.title())
+        self.expect_bytes_of_render(*viewer.screenshot())
+        self.end(viewer)
+
     def test_closed_while_a_frame_is_rendered(self):
         viewer = self.open(self.file("room"), "--supersample", "8", "--spp", "64", size="640x480", wait=False)
         wait_until("the window's content", lambda: len(set(struct.iter_unpack("3B", self.screen(viewer)))) > 1)
