@@ -6,9 +6,9 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config
-  libtbb-dev libglm-dev libembree-dev libopenexr-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev
+  libtbb-dev libglm-dev libembree-dev libopenexr-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev libjpeg-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
-  libdraco-dev libtinygltf-dev # glTF export
+  libdraco-dev libtinygltf-dev libmeshoptimizer-dev # glTF
 )
 for argument in "$@"; do
   case $argument in
@@ -20,7 +20,7 @@ for argument in "$@"; do
         xvfb xdotool libgl1-mesa-dri # the viewer in a window: a display, keys and mouse, OpenGL in software
         dpkg-dev file # Debian packages of packtrace itself
       ) ;;
-    benchmarks) packages+=(libbenchmark-dev libopenmesh-dev libmeshoptimizer-dev) ;; # what packtrace is compared with
+    benchmarks) packages+=(libbenchmark-dev libopenmesh-dev) ;; # what packtrace is compared with
     python) packages+=(python3-dev python3-numpy pybind11-dev) ;;
     *) packages+=("$argument") ;;
   esac

@@ -117,7 +117,8 @@ ImportResult import_mesh_files(std::span<const std::filesystem::path> files, con
   DirectiveFeed feed(import.builder, import.reporter, options.memory);
   ImportStatistics read;
   std::vector<std::filesystem::path> named;
-  const Place end = read_mesh_files(files, {options, feed, import.files, read, named, progress});
+  MeshFiles mesh_files(files, {options, feed, import.files, import.file_names, read, named, progress});
+  const Place end = mesh_files.read();
   ImportResult result = import.finish(end);
   result.files.insert(result.files.end(), named.begin(), named.end());
   result.statistics.files_read += read.files_read;

@@ -34,9 +34,10 @@ struct ImportOptions {
   /// Number of the world (WorldBegin ... WorldEnd with its options) to read, from 1. Unset: the first, with a warning
   /// if there are more.
   std::optional<uint32_t> world;
-  std::optional<double> time;  ///< time at which animations are evaluated; unset: shutter opening of the camera
-  double mesh_scale = 1.0;     ///< factor of the coordinates of mesh files, within [1e-30, 1e30]
-  UpAxis mesh_up = UpAxis::kY; ///< up axis of mesh files; scenes have y
+  std::optional<double> time; ///< time at which animations are evaluated; unset: shutter opening of the camera
+  double mesh_scale = 1.0;    ///< factor of the coordinates of mesh files, within [1e-30, 1e30]
+  bool allow_uris_outside_folder = false; ///< glTF files may name files outside their folder
+  UpAxis mesh_up = UpAxis::kY;            ///< up axis of mesh files; scenes have y
 };
 
 /// Statistics of an import, for reports.

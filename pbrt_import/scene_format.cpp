@@ -28,6 +28,8 @@ std::string_view to_string(SceneFormat format) {
     return "OBJ";
   case SceneFormat::kStl:
     return "STL";
+  case SceneFormat::kGltf:
+    return "glTF";
   }
   return "";
 }
@@ -40,10 +42,12 @@ SceneFormat scene_format(const std::filesystem::path& file) {
   if (ending == ".ply") return SceneFormat::kPly;
   if (ending == ".obj") return SceneFormat::kObj;
   if (ending == ".stl") return SceneFormat::kStl;
+  if (ending == ".gltf" || ending == ".glb") return SceneFormat::kGltf;
   try {
     std::array<char, 4> start{};
     const size_t size = InputFile(file, start.size()).read(start);
     const std::string_view text(start.data(), size);
+    if (text == "glTF") return SceneFormat::kGltf;
     if (text == "ply\n" || text == "ply\r") return SceneFormat::kPly;
   } catch (const Error&) { // whoever reads the file reports the error
   }

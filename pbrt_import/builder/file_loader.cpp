@@ -61,10 +61,12 @@ FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
   outcome.error = problem_of([&] {
     MemoryReservation content(options_.memory);
     outcome.memory = MemoryReservation(options_.memory);
-    const std::vector<std::byte> bytes = read_whole_file(image.path, kNoLimit, &content);
-    outcome.bytes = bytes.size();
-    image.summary = read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours, image.want_radiance},
-                               outcome.memory);
+    std::vector<std::byte> file;
+    if (image.embedded.empty()) file = read_whole_file(image.path, kNoLimit, &content);
+    outcome.bytes = file.size();
+    image.summary =
+        read_image(image.embedded.empty() ? std::span<const std::byte>(file) : image.embedded, image.decode_srgb,
+                   {image.want_mask, image.want_colours, image.want_radiance, image.alpha_cutoff}, outcome.memory);
   });
   outcome.memory.resize(bytes_of(image.summary), "its pixels");
   image.missing = !outcome.error.empty();
@@ -110,7 +112,7 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
   for (size_t i = 0; i < wanted_images.size(); ++i) {
     report_image(*wanted_images[i], image_outcomes[i]);
     statistics.bytes_read += image_outcomes[i].bytes;
-    statistics.files_read += image_outcomes[i].error.empty();
+    statistics.files_read += image_outcomes[i].error.empty() && wanted_images[i]->embedded.empty();
   }
   for (const PlyFile* const file : wanted_plys) {
     report_ply(*file);

@@ -25,6 +25,7 @@
 #include "pbrt_import/base/exr_header.h"
 #include "pbrt_import/base/png_chunks.h"
 #include "pbrt_import/files/image_summarizer.h"
+#include "pbrt_import/files/jpeg.h"
 #include "pbrt_import/files/radiance.h"
 #include "pbrt_import/files/tga.h"
 #include "pbrt_import/scene/albedo_texture.h"
@@ -104,6 +105,18 @@ std::unique_ptr<Sample, StbFree> decode_png(std::span<const std::byte> bytes, in
   return pixels;
 }
 
+/// Mask of the pixels whose alpha is at least a cutoff.
+std::vector<uint32_t> alpha_bits(std::span<const std::byte> png, const PngHeader& header, float cutoff) {
+  const auto pixels = decode_png(png, 4, stbi_load_from_memory);
+  const size_t words = AlphaMask::row_words(header.width);
+  std::vector<uint32_t> bits(words * header.height, 0);
+  const stbi_uc* alpha = pixels.get() + 3;
+  for (size_t y = 0; y < header.height; ++y)
+    for (size_t x = 0; x < header.width; ++x, alpha += 4)
+      if (static_cast<float>(*alpha) / 255.0f >= cutoff) bits[y * words + x / 32] |= 1u << (x % 32);
+  return bits;
+}
+
 ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader& header, bool decode_srgb,
                               ImageWants wants) {
   const PngPalette palette = png_palette(bytes, kDamaged);
@@ -149,6 +162,7 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
     summary = grey ? summarize_bytes<1>(pixels.get(), header.width, header.height, wants, linear)
                    : summarize_bytes<3>(pixels.get(), header.width, header.height, wants, linear);
   }
+  if (wants.mask && wants.alpha_cutoff) summary.nonzero = alpha_bits(bytes, header, *wants.alpha_cutoff);
   if (header.wrong_checksums > 0)
     summary.problems.push_back(header.wrong_checksums == 1
                                    ? std::string("a chunk has a wrong checksum; the image may be damaged")
@@ -160,7 +174,7 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
 /// TGA has no magic number, so it is tried for files that match no other format.
 ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
   const std::optional<TgaHeader> header = parse_tga_header(bytes);
-  if (!header) fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
+  if (!header) fail("not an image in a known format (PNG, JPEG, TGA, EXR, PFM, HDR)");
   constexpr uint64_t kPixelsPerByte = 64; // a run of up to 128 pixels takes at least two bytes
   const ClaimedImageSize size{header->width, header->height, kPixelsPerByte};
   size.check(bytes.size(), size.width * size.height * 3, wants, memory);
@@ -184,6 +198,20 @@ ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, Memory
     summarizer.end_row();
   }
   return summarizer.finish();
+}
+
+ImageSummary read_jpeg(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants,
+                       MemoryReservation& memory) {
+  JpegReader reader(bytes);
+  const ClaimedImageSize size{reader.width(), reader.height()};
+  size.check(bytes.size(), reader.working_bytes(), wants, memory);
+  const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
+  ImageSummarizer summarizer(reader.width(), reader.height(), wants);
+  for (uint32_t y = 0; y < reader.height(); ++y) summarizer.add_row<3>(y, reader.read_row().data(), linear);
+  ImageSummary summary = summarizer.finish();
+  if (const std::string problem = reader.problem(); !problem.empty())
+    summary.problems.push_back("the image may be damaged: " + problem);
+  return summary;
 }
 
 /// Input stream of OpenEXR over bytes in memory.
@@ -305,8 +333,7 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, Memory
 /// file starts with any of these bytes.
 std::string_view other_format(std::string_view file) {
   using namespace std::string_view_literals;
-  for (const auto& [magic, name] : {std::pair{"\xff\xd8\xff"sv, "JPEG"sv},
-                                    {"BM"sv, "BMP"sv},
+  for (const auto& [magic, name] : {std::pair{"BM"sv, "BMP"sv},
                                     {"GIF8"sv, "GIF"sv},
                                     {"II*\0"sv, "TIFF"sv},
                                     {"MM\0*"sv, "TIFF"sv},
@@ -316,18 +343,27 @@ std::string_view other_format(std::string_view file) {
   return {};
 }
 
-} // namespace
-
-ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants,
-                        MemoryReservation& memory) {
+ImageSummary read_by_format(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants,
+                            MemoryReservation& memory) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (text.starts_with("\x76\x2f\x31\x01")) return read_exr(bytes, wants, memory);
   if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, wants, memory);
   if (text.starts_with("#?")) return read_hdr(bytes, wants, memory);
   if (const std::string_view name = other_format(text); !name.empty())
-    fail("images in " + std::string(name) + " format are not read, only PNG, TGA, EXR, PFM and HDR");
+    fail("images in " + std::string(name) + " format are not read, only PNG, JPEG, TGA, EXR, PFM and HDR");
+  if (text.starts_with("\xff\xd8\xff")) return read_jpeg(bytes, decode_srgb, wants, memory);
   return text.starts_with("\x89PNG") ? read_png(bytes, decode_srgb, wants, memory)
                                      : read_tga(bytes, decode_srgb, wants, memory);
+}
+
+} // namespace
+
+ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants,
+                        MemoryReservation& memory) {
+  ImageSummary summary = read_by_format(bytes, decode_srgb, wants, memory);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (wants.alpha_cutoff && !text.starts_with("\x89PNG")) std::ranges::fill(summary.nonzero, ~0u); // no alpha is read
+  return summary;
 }
 
 } // namespace packtrace

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,7 +20,7 @@ struct ImageSummary {
   Vec3 average{0.0f};                ///< linear RGB; negative and non-finite values count as 0
   std::vector<std::string> problems; ///< damage that did not prevent reading
   std::vector<uint8_t> rgb;          ///< layout of AlbedoTexture, clamped to [0, 1]; empty if not wanted or too large
-  std::vector<uint32_t> nonzero;     ///< layout of AlphaMask; a bit is set if any channel is not 0
+  std::vector<uint32_t> nonzero;     ///< layout of AlphaMask; a bit is set if any channel is not 0, or see alpha_cutoff
   uint32_t map_width = 0;            ///< of `radiance`: that of the image, at most kMaxMapWidth
   uint32_t map_height = 0;
   std::vector<Vec3> radiance; ///< linear RGB, row 0 on top, averaged to the map's size; empty if not wanted
@@ -30,13 +31,16 @@ struct ImageWants {
   bool mask = false;     ///< fill ImageSummary::nonzero
   bool colours = false;  ///< fill ImageSummary::rgb
   bool radiance = false; ///< fill ImageSummary::radiance
+  /// Set: bits of the mask are set where the image's alpha, in [0, 1], is at least this; everywhere without alpha.
+  std::optional<float> alpha_cutoff{};
 };
 
 /// Only the average is kept of images with more texels.
 inline constexpr uint64_t kMaxTextureTexels = uint64_t{1} << 26;
 
-/// Reads the formats of pbrt, which are PNG, TGA, OpenEXR and PFM, and also HDR. Alpha channels are ignored, as in
-/// pbrt. Other formats, which pbrt does not read either, are rejected with their name.
+/// Reads the formats of pbrt, which are PNG, TGA, OpenEXR and PFM, and also HDR and JPEG. Alpha channels are ignored,
+/// as in pbrt, unless ImageWants::alpha_cutoff is set, which applies to PNG. Other formats are rejected with their
+/// name.
 /// @param bytes the whole file
 /// @param decode_srgb whether values of the integer formats are sRGB-encoded
 /// @param memory grows by the memory that the summary and decoding need, before it is allocated

@@ -38,6 +38,7 @@ std::filesystem::path FileNames::resolve(std::string_view raw, const Place& plac
     reporter.error(place, "empty file name; nothing is read");
     return {};
   }
+  if (embedded_.contains(name)) return name;
   std::filesystem::path path = (folder_ / name).lexically_normal();
   if (raw.find('\\') != std::string_view::npos && !file_exists(path)) {
     // The backslashes are literal separators: "textures\brick.png" does not contain a backspace.

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
@@ -30,6 +33,15 @@ public:
   /// Records a file that the scene names but the import does not read.
   void mention(std::string_view raw);
 
+  /// Makes bytes known as a file of this name, for images within glTF files. A name that is in use is replaced.
+  /// @param bytes must live as long as this object
+  void embed(const std::string& name, std::span<const std::byte> bytes) { embedded_[name] = bytes; }
+  /// Content of an embedded file by the path that resolve() returns for its name; empty if there is none.
+  std::span<const std::byte> embedded(const std::filesystem::path& path) const {
+    const auto found = embedded_.find(path.string());
+    return found == embedded_.end() ? std::span<const std::byte>() : found->second;
+  }
+
   /// Takes the paths of all names passed to resolve() and mention(), without duplicates, in no particular order. Call
   /// once.
   std::vector<std::filesystem::path> take_named();
@@ -38,6 +50,7 @@ private:
   std::filesystem::path folder_;
   bool allow_outside_;
   std::unordered_set<std::string> named_;
+  std::unordered_map<std::string, std::span<const std::byte>> embedded_;
 };
 
 } // namespace packtrace

@@ -88,14 +88,16 @@ TextureGraph::Node TextureGraph::checkerboard(Node a, Node b, const TextureMappi
 }
 
 uint32_t TextureGraph::request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place,
-                                     uint64_t sequence) {
-  const auto [it, inserted] = image_numbers_.try_emplace({path, decode_srgb}, static_cast<uint32_t>(images_.size()));
+                                     uint64_t sequence, std::optional<float> alpha_cutoff) {
+  const auto [it, inserted] =
+      image_numbers_.try_emplace({path, decode_srgb, alpha_cutoff}, static_cast<uint32_t>(images_.size()));
   if (inserted) {
     ImageRequest request;
     request.path = path;
     request.decode_srgb = decode_srgb;
     request.place = place;
     request.sequence = sequence;
+    request.alpha_cutoff = alpha_cutoff;
     images_.push_back(std::move(request));
   }
   return it->second;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -24,7 +25,7 @@ struct TextureMapping {
   bool is_uv = true;
 };
 
-/// An image file that textures use. There is one request per file and colour encoding.
+/// An image file that textures use. There is one request per file, colour encoding and alpha cutoff.
 struct ImageRequest {
   std::filesystem::path path;
   bool decode_srgb = false;
@@ -33,10 +34,12 @@ struct ImageRequest {
   bool needed = false;   ///< a used material depends on it
   bool want_mask = false;
   bool want_colours = false;
-  bool want_radiance = false; ///< set by users of request_image()
-  bool missing = false;       ///< missing or unreadable: counts as 1 everywhere, as in pbrt
-  ImageSummary summary;       ///< filled in by FileLoader
-  MemoryReservation memory;   ///< for the summary
+  bool want_radiance = false;          ///< set by users of request_image()
+  std::optional<float> alpha_cutoff;   ///< as in ImageWants
+  std::span<const std::byte> embedded; ///< content of an image within another file; empty: path is a file
+  bool missing = false;                ///< missing or unreadable: counts as 1 everywhere, as in pbrt
+  ImageSummary summary;                ///< filled in by FileLoader
+  MemoryReservation memory;            ///< for the summary
 };
 
 /// All textures of a scene as expressions over constants and images. The operands of a node have smaller numbers.
@@ -53,7 +56,8 @@ public:
   Node checkerboard(Node a, Node b, const TextureMapping& mapping);
 
   /// Returns the index of the request with this path and encoding, which image() takes; adds it if there is none.
-  uint32_t request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place, uint64_t sequence);
+  uint32_t request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place, uint64_t sequence,
+                         std::optional<float> alpha_cutoff = std::nullopt);
   std::vector<ImageRequest>& images() { return images_; }
 
   /// The Texture directive that defined a node.
@@ -115,7 +119,7 @@ private:
   std::vector<Vec3> averages_; ///< averages of the first nodes, extended on demand
   std::unordered_map<Node, Origin> origins_;
   std::vector<ImageRequest> images_;
-  std::map<std::pair<std::filesystem::path, bool>, uint32_t> image_numbers_;
+  std::map<std::tuple<std::filesystem::path, bool, std::optional<float>>, uint32_t> image_numbers_;
 };
 
 } // namespace packtrace

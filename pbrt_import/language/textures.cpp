@@ -56,6 +56,16 @@ TextureMapping read_mapping(const TextureMaker& maker) {
   return mapping;
 }
 
+/// Parameters that pbrt does not have, of images whose holes are in their alpha channel: "string channel" "alpha" with
+/// "float cutoff".
+std::optional<float> read_alpha_cutoff(const TextureMaker& maker) {
+  const std::string channel = maker.directive.parameters.get_string("channel", "rgb");
+  if (channel == "alpha") return maker.finite_float("cutoff", 0.5f);
+  if (channel != "rgb")
+    maker.context.reporter.error(maker.directive.place, "unknown channel " + in_quotes(channel) + "; rgb is used");
+  return std::nullopt;
+}
+
 std::optional<Node> make_imagemap(const TextureMaker& maker) {
   const TextureContext& context = maker.context;
   const ParameterList& list = maker.directive.parameters;
@@ -85,11 +95,12 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
   for (char& c : extension)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + 32);
   const bool decode_srgb = list.get_bool("gamma", extension == ".png" || extension == ".tga");
-  const uint32_t image =
-      context.graph.request_image(path, decode_srgb, maker.directive.place, context.reporter.sequence());
+  const uint32_t image = context.graph.request_image(path, decode_srgb, maker.directive.place,
+                                                     context.reporter.sequence(), read_alpha_cutoff(maker));
   std::error_code error;
   ImageRequest& request = context.graph.images()[image];
-  if (!request.missing && !std::filesystem::is_regular_file(path, error)) {
+  request.embedded = context.file_names.embedded(path);
+  if (!request.missing && request.embedded.empty() && !std::filesystem::is_regular_file(path, error)) {
     request.missing = true;
     const std::string name = in_quotes(path.string(), kMaxShownPath);
     context.reporter.error(file->place,

@@ -1,6 +1,7 @@
 #include "pbrt_import/mesh_files/directive_feed.h"
 
 #include <algorithm>
+#include <array>
 
 #include "pbrt_import/text/problem_text.h"
 
@@ -71,6 +72,15 @@ void DirectiveFeed::text(std::string_view name, std::string_view value) {
 void DirectiveFeed::texture(std::string_view name, std::string_view texture) {
   add(ParameterType::kTexture, name).strings.push_back(escape(texture));
   directive_.parameters.keep();
+}
+
+void DirectiveFeed::transform(std::string_view keyword, const Place& place, const DAffine& map) {
+  std::array<double, 16> columns{};
+  for (int c = 0; c < 4; ++c)
+    for (int r = 0; r < 3; ++r) columns[static_cast<size_t>(4 * c + r)] = map[c][r];
+  columns[15] = 1.0;
+  begin(keyword, place, {}, columns);
+  send();
 }
 
 void DirectiveFeed::send() {

@@ -38,6 +38,8 @@ public:
   /// A string without escapes, such as a path.
   void text(std::string_view name, std::string_view value);
   void texture(std::string_view name, std::string_view texture);
+  /// Sends a Transform or ConcatTransform.
+  void transform(std::string_view keyword, const Place& place, const DAffine& map);
   /// Executes the directive. Throws like SceneBuilder::handle(); MemoryError with the directive's place.
   void send();
 

@@ -16,6 +16,7 @@ struct MeshFileContext {
   const ImportOptions& options;
   DirectiveFeed& feed;
   SourceFiles& files;                        ///< receives the files that are read
+  FileNames& file_names;                     ///< receives images within files
   ImportStatistics& statistics;              ///< files and bytes read are added
   std::vector<std::filesystem::path>& named; ///< receives the files that the file names
   Progress& progress;

@@ -200,7 +200,7 @@ void add_sequence_options(CLI::App& verb, BakeOptions& options) {
 
 void add_bake_options(CLI::App& verb, BakeOptions& options) {
   verb.add_option("SCENE", options.inputs,
-                  "pbrt-v3 scene, or one or more .ply, .obj or .stl files, which make one scene")
+                  "pbrt-v3 scene, or one or more .gltf, .glb, .obj, .ply or .stl files, which make one scene")
       ->required();
   add_output_option(verb, options.output,
                     "Output file (.ptk), or - for standard output. Required unless --dry-run is given");

@@ -58,12 +58,14 @@ void add_scene_options(CLI::App& verb, SceneOptions& options) {
                   "which the camera's shutter opens)")
       ->type_name("T")
       ->group(kGroup);
-  constexpr const char* kMeshGroup = "Options for .ply, .obj and .stl files";
+  constexpr const char* kMeshGroup = "Options for mesh files (.ply, .obj, .stl, .gltf, .glb)";
   verb.add_option("--up", options.up, "Axis of the file that points upwards (default y; scenes have y)")
       ->check(one_of({"x", "y", "z"}))
       ->group(kMeshGroup);
   verb.add_option("--scale", options.scale, "Factor of all coordinates (default 1)")
       ->check(number_in(1e-30, 1e30))
+      ->group(kMeshGroup);
+  verb.add_flag("--allow-outside", options.allow_outside, "Read files outside a glTF file's folder that it names")
       ->group(kMeshGroup);
 }
 
@@ -74,6 +76,7 @@ std::vector<std::string> scene_words(const SceneOptions& options) {
   if (options.time) add("--time", number_text(*options.time));
   if (options.up) add("--up", *options.up);
   if (options.scale) add("--scale", number_text(*options.scale));
+  if (options.allow_outside) words.emplace_back("--allow-outside");
   if (options.strict) words.emplace_back("--strict");
   return words;
 }
@@ -81,7 +84,7 @@ std::vector<std::string> scene_words(const SceneOptions& options) {
 const char* option_without_use(const std::filesystem::path& file, const SceneOptions& options) {
   const bool baked = is_baked_file(file), mesh = !baked && scene_format(file) != SceneFormat::kPbrt;
   if (baked || mesh) {
-    if (options.time) return "--time";
+    if (options.time && scene_format(file) != SceneFormat::kGltf) return "--time";
     if (options.world.value_or(1) != 1) return "--world";
   }
   if (!mesh) return options.up ? "--up" : options.scale ? "--scale" : nullptr;
@@ -136,7 +139,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   if (format == SceneFormat::kPbrt) require_scene_text(file);
   if (const char* const option = option_without_use(file, scene_options))
     throw FileError(ErrorKind::kUsage, file,
-                    std::string(option) + (format == SceneFormat::kPbrt ? " only applies to .ply, .obj and .stl files"
+                    std::string(option) + (format == SceneFormat::kPbrt ? " only applies to mesh files"
                                                                         : " only applies to .pbrt scenes"));
   Diagnostics diagnostics;
   ImportOptions options;
@@ -145,6 +148,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   options.time = scene_options.time;
   const std::string up = scene_options.up.value_or("y");
   options.mesh_up = up == "x" ? UpAxis::kX : up == "z" ? UpAxis::kZ : UpAxis::kY;
+  options.allow_uris_outside_folder = scene_options.allow_outside;
   options.mesh_scale = scene_options.scale.value_or(1.0);
   options.keep_textures = keep_textures;
   options.keep_unused_objects = scene_options.keep_unused_objects;

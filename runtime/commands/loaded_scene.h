@@ -31,12 +31,13 @@ struct SceneOptions {
   std::optional<double> time;
   std::optional<std::string> up;         ///< axis of mesh files: "x", "y" or "z"
   std::optional<double> scale;           ///< of mesh files
+  bool allow_outside = false;            ///< glTF files may name files outside their folder
   std::vector<std::string> joined_files; ///< further mesh files of the scene; no option of its own
   bool keep_unused_objects = false;      ///< as in ImportOptions; no option of its own
   bool keep_shading = false;             ///< as in ImportOptions; no option of its own
 };
 
-/// Adds --strict, --world, --time, --up and --scale to a verb. `options` must outlive the verb.
+/// Adds --strict, --world, --time, --up, --scale and --allow-outside to a verb. `options` must outlive the verb.
 void add_scene_options(CLI::App& verb, SceneOptions& options);
 
 /// The given options as words of a command line.

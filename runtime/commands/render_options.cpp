@@ -113,9 +113,8 @@ void add_tracer_options(CLI::App& verb, RenderOptions& options) {
 }
 
 void add_render_options(CLI::App& verb, RenderOptions& options) {
-  verb.add_option(
-          "FILE", options.input,
-          ".ptk file, or a .pbrt scene or .ply, .obj or .stl file, which is traced as floats without compression")
+  verb.add_option("FILE", options.input,
+                  ".ptk file, or a .pbrt scene or mesh file, which is traced as floats without compression")
       ->required();
   add_picture_options(verb, options);
   add_view_options(verb, options);

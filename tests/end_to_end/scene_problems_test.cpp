@@ -151,10 +151,10 @@ TEST(MeshFilesAsScenes, OptionsWithoutUseAreRefused) {
   ASSERT_EQ(run_packtrace({"bake", scene, "-o", baked}).exit_code, 0);
   for (const auto& [command, problem] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"info", obj, "--world", "2"}, "--world only applies to .pbrt scenes"},
-           {{"info", scene, "--up", "z"}, "--up only applies to .ply, .obj and .stl files"},
+           {{"info", scene, "--up", "z"}, "--up only applies to mesh files"},
            {{"info", baked, "--scale", "2"}, "--scale does not apply to a .ptk file"},
-           {{"bake", obj, scene, "-o", bench / "x.ptk"}, "only PLY, OBJ and STL files can be joined"},
-           {{"bake", scene, obj, "-o", bench / "x.ptk"}, "only PLY, OBJ and STL files can be joined"},
+           {{"bake", obj, scene, "-o", bench / "x.ptk"}, "only PLY, OBJ, STL and glTF files can be joined"},
+           {{"bake", scene, obj, "-o", bench / "x.ptk"}, "only PLY, OBJ, STL and glTF files can be joined"},
            {{"bake", obj, obj, "-o", bench / "x.ptk", "--target", "size=1MB"}, "--target measures one file"}}) {
     const CommandResult result = run_packtrace(command);
     EXPECT_EQ(result.exit_code, 2) << result.err;

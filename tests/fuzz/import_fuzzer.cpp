@@ -45,7 +45,9 @@ std::string outcome(const std::filesystem::path& main_file, const ImportOptions&
     (void)world_bounds(result.scene);
     return fingerprint(result, diagnostics);
   } catch (const Error& error) {
-    require(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kLimitExceeded, "kind of error");
+    require(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kLimitExceeded ||
+                error.kind() == ErrorKind::kUnsupported,
+            "kind of error");
     require(*error.what() != '\0', "error without a text");
     return error.what();
   }
@@ -55,7 +57,8 @@ std::string outcome(const std::filesystem::path& main_file, const ImportOptions&
 std::filesystem::path chosen_file(std::string_view text, const std::filesystem::path& main_file) {
   for (const SceneFile& file : split_scene(text)) {
     const std::filesystem::path path = main_file.parent_path() / file.name;
-    if (scene_format(path) == SceneFormat::kObj || scene_format(path) == SceneFormat::kStl) return path;
+    const SceneFormat format = scene_format(path);
+    if (format == SceneFormat::kObj || format == SceneFormat::kStl || format == SceneFormat::kGltf) return path;
   }
   return main_file;
 }

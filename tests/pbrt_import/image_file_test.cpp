@@ -162,15 +162,12 @@ TEST(PfmImage, NegativeValuesCountAsZeroAndAreReported) {
 // Other formats
 
 TEST(ImageFormats, ThoseThatAreNotReadAreNamed) {
-  for (const auto& [magic, name] : {std::pair{"\xff\xd8\xff\xe0"s, "JPEG"},
-                                    {"BM"s, "BMP"},
-                                    {"GIF89a"s, "GIF"},
-                                    {"II*\0"s, "TIFF"},
-                                    {"MM\0*"s, "TIFF"}})
+  for (const auto& [magic, name] :
+       {std::pair{"8BPS"s, "Photoshop"}, {"BM"s, "BMP"}, {"GIF89a"s, "GIF"}, {"II*\0"s, "TIFF"}, {"MM\0*"s, "TIFF"}})
     EXPECT_EQ(complaint(magic + std::string(100, '\0')),
-              "images in " + std::string(name) + " format are not read, only PNG, TGA, EXR, PFM and HDR");
+              "images in " + std::string(name) + " format are not read, only PNG, JPEG, TGA, EXR, PFM and HDR");
   for (const std::string& file : {""s, "text"s, "\xff\xd8"s})
-    EXPECT_EQ(complaint(file), "not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
+    EXPECT_EQ(complaint(file), "not an image in a known format (PNG, JPEG, TGA, EXR, PFM, HDR)");
 }
 
 TEST(ImageFormats, WhatFuzzingFoundIsRefused) {

@@ -1,0 +1,129 @@
+#include "pbrt_import/gltf/gltf_compression.h"
+
+#include <limits>
+#include <memory>
+#include <new>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wconversion"
+#pragma GCC diagnostic ignored "-Wshadow"
+#include <draco/compression/decode.h>
+#pragma GCC diagnostic pop
+#include <meshoptimizer.h>
+
+namespace packtrace::gltf {
+
+MeshoptView read_meshopt_view(const Value& extension) {
+  MeshoptView view;
+  view.count = extension.at("count").integer();
+  const uint64_t stride = extension.at("byteStride").integer();
+  const std::string mode = extension.at("mode").text(), filter = extension.text_or("filter", "NONE");
+  if (mode == "ATTRIBUTES")
+    view.mode = MeshoptView::Mode::kAttributes;
+  else if (mode == "TRIANGLES")
+    view.mode = MeshoptView::Mode::kTriangles;
+  else if (mode == "INDICES")
+    view.mode = MeshoptView::Mode::kIndices;
+  else
+    extension.fail("has an unknown mode");
+  if (filter == "OCTAHEDRAL")
+    view.filter = MeshoptView::Filter::kOctahedral;
+  else if (filter == "QUATERNION")
+    view.filter = MeshoptView::Filter::kQuaternion;
+  else if (filter == "EXPONENTIAL")
+    view.filter = MeshoptView::Filter::kExponential;
+  else if (filter != "NONE")
+    extension.fail("has an unknown filter");
+  const bool attributes = view.mode == MeshoptView::Mode::kAttributes;
+  if (attributes ? stride == 0 || stride > 256 || stride % 4 != 0 : stride != 2 && stride != 4)
+    extension.fail("has a byteStride that its mode does not allow");
+  if (view.mode == MeshoptView::Mode::kTriangles && view.count % 3 != 0)
+    extension.fail("has a count that is not a multiple of 3");
+  if (view.count > std::numeric_limits<uint32_t>::max()) extension.fail("has more than 2^32 elements");
+  if ((view.filter == MeshoptView::Filter::kOctahedral && stride != 4 && stride != 8) ||
+      (view.filter == MeshoptView::Filter::kQuaternion && stride != 8) ||
+      (view.filter != MeshoptView::Filter::kNone && !attributes))
+    extension.fail("has a filter that does not fit its byteStride and mode");
+  view.stride = static_cast<uint32_t>(stride);
+  return view;
+}
+
+std::vector<std::byte> decode_meshopt(const MeshoptView& view, std::span<const std::byte> compressed,
+                                      const Value& extension) {
+  std::vector<std::byte> bytes(static_cast<size_t>(view.bytes()));
+  const auto* const data = reinterpret_cast<const unsigned char*>(compressed.data());
+  const auto count = static_cast<size_t>(view.count);
+  int problem = 0;
+  switch (view.mode) {
+  case MeshoptView::Mode::kAttributes:
+    problem = meshopt_decodeVertexBuffer(bytes.data(), count, view.stride, data, compressed.size());
+    break;
+  case MeshoptView::Mode::kTriangles:
+    problem = meshopt_decodeIndexBuffer(bytes.data(), count, view.stride, data, compressed.size());
+    break;
+  case MeshoptView::Mode::kIndices:
+    problem = meshopt_decodeIndexSequence(bytes.data(), count, view.stride, data, compressed.size());
+    break;
+  }
+  if (problem != 0) extension.fail("has damaged data");
+  switch (view.filter) {
+  case MeshoptView::Filter::kOctahedral:
+    meshopt_decodeFilterOct(bytes.data(), count, view.stride);
+    break;
+  case MeshoptView::Filter::kQuaternion:
+    meshopt_decodeFilterQuat(bytes.data(), count, view.stride);
+    break;
+  case MeshoptView::Filter::kExponential:
+    meshopt_decodeFilterExp(bytes.data(), count, view.stride);
+    break;
+  case MeshoptView::Filter::kNone:
+    break;
+  }
+  return bytes;
+}
+
+DracoPrimitive decode_draco(std::span<const std::byte> compressed, const DracoWants& wants, const Value& extension) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char*>(compressed.data()), compressed.size());
+  draco::Decoder decoder;
+  std::unique_ptr<draco::Mesh> mesh;
+  try {
+    auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
+    if (!decoded.ok()) extension.fail(std::string("has damaged Draco data: ") + decoded.status().error_msg());
+    mesh = std::move(decoded).value();
+  } catch (const std::bad_alloc&) {
+    extension.fail("has damaged Draco data: they claim more than the memory holds");
+  } catch (const std::length_error&) {
+    extension.fail("has damaged Draco data: they claim more than the memory holds");
+  }
+  DracoPrimitive primitive;
+  primitive.vertices = mesh->num_points();
+  primitive.indices.reserve(size_t{mesh->num_faces()} * 3);
+  for (draco::FaceIndex face(0); face < mesh->num_faces(); ++face)
+    for (const draco::PointIndex& point : mesh->face(face)) {
+      if (point.value() >= primitive.vertices) extension.fail("has damaged Draco data: an index is out of range");
+      primitive.indices.push_back(point.value());
+    }
+  const Value numbers = extension.at("attributes");
+  for (const auto& [name, components] : wants) {
+    const std::optional<uint64_t> number = numbers.find_integer(name.c_str());
+    if (!number) continue;
+    const draco::PointAttribute* const attribute = *number <= std::numeric_limits<uint32_t>::max()
+                                                       ? mesh->GetAttributeByUniqueId(static_cast<uint32_t>(*number))
+                                                       : nullptr;
+    if (!attribute) extension.fail("names the attribute " + name + ", which the Draco data lack");
+    if (attribute->num_components() < static_cast<int>(components)) extension.fail("has too few components of " + name);
+    std::vector<float> values(size_t{primitive.vertices} * components);
+    for (draco::PointIndex point(0); point < primitive.vertices; ++point) {
+      const draco::AttributeValueIndex value = attribute->mapped_index(point);
+      if (value.value() >= attribute->size() ||
+          !attribute->ConvertValue<float>(value, static_cast<int8_t>(components),
+                                          &values[size_t{point.value()} * components]))
+        extension.fail("has damaged Draco data of " + name);
+    }
+    primitive.attributes[name] = std::move(values);
+  }
+  return primitive;
+}
+
+} // namespace packtrace::gltf

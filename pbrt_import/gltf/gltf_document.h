@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pbrt_import/gltf/gltf_json.h"
+#include "pbrt_import/mesh_files/mesh_file_context.h"
+
+namespace packtrace::gltf {
+
+/// A glTF 2.0 document, as .gltf or .glb, with its buffers, which are read when they are first used.
+class Document {
+public:
+  /// Reads the JSON text. Throws Error(kInput) if the file cannot be read or is not glTF 2.0; Error(kUnsupported) if it
+  /// requires an extension that is not known; MemoryError.
+  /// @param file_number of the file in SourceFiles
+  Document(const std::filesystem::path& file, uint32_t file_number, const MeshFileContext& context);
+
+  Value root() const { return {json_, {}}; }
+  /// Element of a top-level array, such as meshes[3].
+  Value element(const char* array, uint64_t index) const;
+  /// Number of elements of a top-level array, 0 if it is absent.
+  size_t count(const char* array) const;
+
+  /// Bytes of a buffer view, decoded if it is compressed by EXT_meshopt_compression. They live as long as the document.
+  std::span<const std::byte> view_bytes(uint64_t view);
+
+  /// Bytes that a URI names: a data URI, or a file beside the document.
+  std::span<const std::byte> uri_bytes(const Value& uri);
+  /// Path of the file that a URI names. Throws if it is not a relative path within the document's folder and files
+  /// outside are not allowed.
+  std::filesystem::path uri_file(const Value& uri) const;
+
+  uint32_t file_number() const { return file_number_; }
+  /// Place for messages about the document: it has no lines that matter.
+  Place place() const { return {file_number_, 0, 0}; }
+  const MeshFileContext& context() const { return context_; }
+  /// Grows with all memory that is kept of the document.
+  MemoryReservation& memory() { return memory_; }
+
+private:
+  void parse(std::string_view text);
+  void split_binary();
+  void check_extensions() const;
+  std::span<const std::byte> buffer_bytes(uint64_t buffer);
+  std::span<const std::byte> keep(std::vector<std::byte> bytes);
+
+  MeshFileContext context_;
+  std::filesystem::path folder_;
+  uint32_t file_number_;
+  PaddedText content_;
+  std::string_view json_text_;
+  std::span<const std::byte> binary_; ///< chunk of a .glb file
+  nlohmann::json json_;
+  std::map<uint64_t, std::span<const std::byte>> buffers_, views_; ///< read so far
+  std::vector<std::unique_ptr<std::vector<std::byte>>> kept_;
+  MemoryReservation memory_;
+};
+
+} // namespace packtrace::gltf

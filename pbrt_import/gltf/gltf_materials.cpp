@@ -1,0 +1,176 @@
+#include "pbrt_import/gltf/gltf_materials.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pbrt_import/text/problem_text.h"
+
+namespace packtrace::gltf {
+namespace {
+
+Vec3 to_vec3(const std::vector<double>& v) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+
+float clamped(double value) { return static_cast<float>(std::clamp(value, 0.0, 1.0)); }
+
+std::string_view wrap_name(uint64_t mode) { return mode == 33071 ? "clamp" : "repeat"; }
+
+} // namespace
+
+Materials::Materials(Document& document, FileNames& file_names) : document_(document), file_names_(file_names) {
+  for (size_t i = 0; i < document.count("materials"); ++i) {
+    MaterialUse& use = uses_.emplace_back();
+    const std::string problem = problem_of([&] {
+      const Value material = document.element("materials", i);
+      use.name = unique_name(material, i);
+      define(material, use);
+    });
+    if (problem.empty()) continue;
+    document.context().feed.reporter().error(document.place(), problem + "; the material is grey");
+    use = MaterialUse{};
+  }
+}
+
+const MaterialUse& Materials::use(std::optional<uint64_t> material) const {
+  if (!material) return default_;
+  if (*material >= uses_.size())
+    throw Error(ErrorKind::kInput, "materials has no element " + std::to_string(*material));
+  return uses_[static_cast<size_t>(*material)];
+}
+
+std::string Materials::unique_name(const Value& material, size_t number) {
+  const std::string name = material.text_or("name", "material " + std::to_string(number));
+  const bool taken = std::ranges::any_of(uses_, [&](const MaterialUse& use) { return use.name == name; });
+  return taken || name.empty() ? name + " (" + std::to_string(number) + ")" : name;
+}
+
+void Materials::warn(const std::string& text) { document_.context().feed.reporter().warning(document_.place(), text); }
+
+/// The name under which the importer finds an image: a path, or that of an embedded file.
+std::string Materials::image_file(uint64_t number) {
+  const Value image = document_.element("images", number);
+  const std::optional<Value> uri = image.find("uri");
+  if (uri && !uri->text().starts_with("data:")) return document_.uri_file(*uri).string();
+  const std::span<const std::byte> bytes =
+      uri ? document_.uri_bytes(*uri) : document_.view_bytes(image.at("bufferView").integer());
+  const std::string name =
+      "image " + std::to_string(number) + " of glTF file " + std::to_string(document_.file_number());
+  file_names_.embed(name, bytes);
+  return name;
+}
+
+void Materials::read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset) {
+  use.uv_set = info.find_integer("texCoord").value_or(0);
+  const std::optional<Value> transform = info.extension("KHR_texture_transform");
+  if (!transform) return;
+  use.uv_set = transform->find_integer("texCoord").value_or(use.uv_set);
+  const std::vector<double> s = transform->numbers_or("scale", {1.0, 1.0}),
+                            o = transform->numbers_or("offset", {0.0, 0.0});
+  scale = {static_cast<float>(s[0]), static_cast<float>(s[1])};
+  offset = {static_cast<float>(o[0]), static_cast<float>(o[1])};
+  use.uv_rotation = transform->number_or("rotation", 0.0);
+}
+
+/// Defines a texture of an image; returns its name.
+/// @param info textureInfo object
+/// @param cutoff unset: its colours; otherwise a mask of the texels with at least this alpha
+std::string Materials::define_image(const Value& info, MaterialUse& use, std::string_view what,
+                                    std::optional<float> cutoff) {
+  const Value texture = document_.element("textures", info.at("index").integer());
+  Vec2 scale(1.0f), offset(0.0f);
+  read_mapping(info, use, scale, offset);
+  std::string_view wrap = "repeat";
+  if (const std::optional<uint64_t> sampler = texture.find_integer("sampler")) {
+    const Value settings = document_.element("samplers", *sampler);
+    const uint64_t s = settings.find_integer("wrapS").value_or(10497),
+                   t = settings.find_integer("wrapT").value_or(10497);
+    wrap = wrap_name(s);
+    if (s == 33648 || t == 33648) warn("mirrored textures repeat without mirroring");
+    if (wrap_name(t) != wrap) warn("textures that wrap differently along u and v wrap as along u");
+  }
+  if (use.uv_rotation != 0.0) { // vertices get the transform, since textures have no rotation
+    use.uv_scale = scale, use.uv_offset = offset;
+    scale = Vec2(1.0f), offset = Vec2(0.0f);
+  }
+  const std::string name = use.name + ": " + std::string(what);
+  const std::string file = image_file(texture.at("source").integer());
+  DirectiveFeed& feed = document_.context().feed;
+  feed.begin("Texture", document_.place(), {name, cutoff ? "float" : "spectrum", "imagemap"});
+  feed.text("filename", file);
+  feed.number("uscale", scale.x);
+  feed.number("vscale", scale.y);
+  feed.number("udelta", offset.x);
+  feed.number("vdelta", 1.0f - offset.y - scale.y); // glTF's v points downwards
+  feed.text("wrap", wrap);
+  if (cutoff) {
+    feed.text("channel", "alpha");
+    feed.number("cutoff", *cutoff);
+  } else {
+    feed.flag("gamma", true);
+  }
+  feed.send();
+  return name;
+}
+
+void Materials::define(const Value& material, MaterialUse& use) {
+  const nlohmann::json empty = nlohmann::json::object();
+  const Value base = material.find("pbrMetallicRoughness").value_or(Value(empty, material.path()));
+  const std::vector<double> factor = base.numbers_or("baseColorFactor", {1.0, 1.0, 1.0, 1.0});
+  const Vec3 colour = glm::clamp(to_vec3(factor), Vec3(0.0f), Vec3(1.0f));
+  const std::optional<Value> image = base.find("baseColorTexture");
+  std::string texture;
+  if (image) texture = define_image(*image, use, "base colour", std::nullopt);
+  DirectiveFeed& feed = document_.context().feed;
+  if (!texture.empty() && colour != Vec3(1.0f)) {
+    feed.begin("Texture", document_.place(), {use.name + ": product", "spectrum", "scale"});
+    feed.texture("tex1", texture);
+    feed.colour("tex2", colour);
+    feed.send();
+    texture = use.name + ": product";
+  }
+
+  const std::string mode = material.text_or("alphaMode", "OPAQUE");
+  const double alpha = factor[3], cutoff = material.number_or("alphaCutoff", 0.5);
+  bool transmits = false;
+  if (mode == "MASK" || (mode == "BLEND" && image)) {
+    if (alpha <= 0.0 || (!image && alpha < cutoff))
+      use.absent = true;
+    else if (image)
+      use.opacity = define_image(*image, use, "opacity", static_cast<float>((mode == "MASK" ? cutoff : 0.5) / alpha));
+  } else if (mode == "BLEND") {
+    use.absent = alpha <= 0.0;
+    transmits = alpha < 0.5;
+  } else if (mode != "OPAQUE") {
+    material.fail("has the unknown alphaMode \"" + mode + "\"");
+  }
+  if (const std::optional<Value> transmission = material.extension("KHR_materials_transmission"))
+    transmits = transmits || transmission->number_or("transmissionFactor", 0.0) >= 0.5;
+  const std::optional<Value> strength = material.extension("KHR_materials_emissive_strength");
+  use.emission = to_vec3(material.numbers_or("emissiveFactor", {0.0, 0.0, 0.0})) *
+                 static_cast<float>(strength ? strength->number_or("emissiveStrength", 1.0) : 1.0);
+  if (glm::any(glm::lessThan(use.emission, Vec3(0.0f)))) material.fail("emits negative light");
+  const std::optional<Value> ior = material.extension("KHR_materials_ior");
+
+  feed.begin("MakeNamedMaterial", document_.place(), {use.name});
+  const bool unlit = material.extension("KHR_materials_unlit").has_value();
+  std::string_view kind = "disney", parameter = "color";
+  if (transmits) kind = "glass", parameter = "Kt";
+  if (unlit) kind = "matte", parameter = "Kd";
+  feed.text("type", kind);
+  if (texture.empty())
+    feed.colour(parameter, colour);
+  else
+    feed.texture(parameter, texture);
+  if (kind == "glass") feed.number("eta", static_cast<float>(std::max(ior ? ior->number_or("ior", 1.5) : 1.5, 1.0)));
+  if (kind == "disney") {
+    feed.number("metallic", clamped(base.number_or("metallicFactor", 1.0)));
+    feed.number("roughness", clamped(base.number_or("roughnessFactor", 1.0)));
+    if (base.has("metallicRoughnessTexture"))
+      warn("textures of metalness and roughness are not read; their factors are used");
+  }
+  feed.send();
+}
+
+} // namespace packtrace::gltf

@@ -1,0 +1,174 @@
+#include "pbrt_import/gltf/gltf_primitive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "pbrt_import/gltf/gltf_accessors.h"
+#include "pbrt_import/gltf/gltf_compression.h"
+
+namespace packtrace::gltf {
+namespace {
+
+enum class Mode : uint64_t { kTriangles = 4, kStrip = 5, kFan = 6 };
+
+/// A primitive's triangles and attributes.
+struct PrimitiveMesh {
+  std::vector<float> positions, normals, uvs; ///< 3, 3 and 2 per vertex; the last two may be empty
+  std::vector<uint32_t> indices;              ///< as its mode arranges them
+  uint64_t vertices = 0;
+};
+
+std::vector<float> read_attribute(Document& document, const Value& attributes, const char* name, uint32_t components,
+                                  uint64_t& vertices) {
+  const std::optional<uint64_t> accessor = attributes.find_integer(name);
+  if (!accessor) return {};
+  AccessorValues values = read_floats(document, *accessor);
+  if (values.components != components) attributes.fail("has a " + std::string(name) + " of the wrong type");
+  if (vertices != 0 && values.count != vertices) attributes.fail("has attributes of different lengths");
+  vertices = values.count;
+  return std::move(values.values);
+}
+
+PrimitiveMesh read_plain(Document& document, const Value& primitive, const std::string& uv_name) {
+  PrimitiveMesh mesh;
+  const Value attributes = primitive.at("attributes");
+  mesh.positions = read_attribute(document, attributes, "POSITION", 3, mesh.vertices);
+  mesh.normals = read_attribute(document, attributes, "NORMAL", 3, mesh.vertices);
+  mesh.uvs = read_attribute(document, attributes, uv_name.c_str(), 2, mesh.vertices);
+  if (const std::optional<uint64_t> indices = primitive.find_integer("indices")) {
+    mesh.indices = read_indices(document, *indices);
+  } else {
+    mesh.indices.resize(static_cast<size_t>(mesh.vertices));
+    std::iota(mesh.indices.begin(), mesh.indices.end(), 0u);
+  }
+  return mesh;
+}
+
+PrimitiveMesh read_draco(Document& document, const Value& primitive, const Value& extension,
+                         const std::string& uv_name) {
+  const std::span<const std::byte> bytes = document.view_bytes(extension.at("bufferView").integer());
+  DracoPrimitive decoded = decode_draco(bytes, {{"POSITION", 3}, {"NORMAL", 3}, {uv_name, 2}}, extension);
+  PrimitiveMesh mesh;
+  mesh.vertices = decoded.vertices;
+  mesh.indices = std::move(decoded.indices);
+  mesh.positions = std::move(decoded.attributes["POSITION"]);
+  mesh.normals = std::move(decoded.attributes["NORMAL"]);
+  mesh.uvs = std::move(decoded.attributes[uv_name]);
+  if (primitive.find_integer("mode").value_or(4) == static_cast<uint64_t>(Mode::kFan))
+    primitive.fail("has a mode that Draco does not know");
+  return mesh;
+}
+
+/// Adds the morph targets of a primitive with the weights of its mesh.
+void morph(Document& document, const Value& mesh_value, const Value& primitive, PrimitiveMesh& mesh) {
+  const std::optional<Value> targets = primitive.find("targets"), weights = mesh_value.find("weights");
+  if (!targets || !weights) return;
+  for (size_t i = 0; i < std::min(targets->size(), weights->size()); ++i) {
+    const double weight = (*weights)[i].number();
+    if (weight == 0.0) continue;
+    uint64_t vertices = mesh.vertices;
+    const std::vector<float> moved = read_attribute(document, (*targets)[i], "POSITION", 3, vertices);
+    for (size_t k = 0; k < moved.size(); ++k) mesh.positions[k] += static_cast<float>(weight * double{moved[k]});
+    const std::vector<float> turned = read_attribute(document, (*targets)[i], "NORMAL", 3, vertices);
+    for (size_t k = 0; k < std::min(turned.size(), mesh.normals.size()); ++k)
+      mesh.normals[k] += static_cast<float>(weight * double{turned[k]});
+  }
+}
+
+std::vector<int32_t> triangles_of(const PrimitiveMesh& mesh, Mode mode, const Value& primitive) {
+  const std::vector<uint32_t>& in = mesh.indices;
+  for (const uint32_t index : in)
+    if (index >= mesh.vertices) primitive.fail("has an index out of range");
+  std::vector<int32_t> out;
+  const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
+    for (const uint32_t index : {a, b, c}) out.push_back(static_cast<int32_t>(index));
+  };
+  if (mode == Mode::kTriangles) {
+    if (in.size() % 3 != 0) primitive.fail("has " + std::to_string(in.size()) + " corners, which are not triangles");
+    out.assign(in.begin(), in.end());
+    return out;
+  }
+  out.reserve(in.size() * 3);
+  for (size_t i = 0; i + 2 < in.size(); ++i) {
+    if (mode == Mode::kFan)
+      add(in[i + 1], in[i + 2], in[0]);
+    else if (i % 2 == 0)
+      add(in[i], in[i + 1], in[i + 2]);
+    else
+      add(in[i], in[i + 2], in[i + 1]);
+  }
+  // Equal neighbours connect strips; their triangles have no area.
+  std::vector<int32_t> kept;
+  kept.reserve(out.size());
+  for (size_t i = 0; i < out.size(); i += 3)
+    if (out[i] != out[i + 1] && out[i + 1] != out[i + 2] && out[i] != out[i + 2])
+      kept.insert(kept.end(), out.begin() + static_cast<std::ptrdiff_t>(i),
+                  out.begin() + static_cast<std::ptrdiff_t>(i + 3));
+  return kept;
+}
+
+/// Turns texture coordinates to pbrt's, whose v points upwards, with a rotating transform applied.
+void convert_uvs(std::vector<float>& uvs, const MaterialUse& use) {
+  const double c = std::cos(use.uv_rotation), s = std::sin(use.uv_rotation);
+  for (size_t i = 0; i + 1 < uvs.size(); i += 2) {
+    double u = double{uvs[i]}, v = double{uvs[i + 1]};
+    if (use.uv_rotation != 0.0) {
+      const double x = u * double{use.uv_scale.x}, y = v * double{use.uv_scale.y};
+      u = c * x + s * y + double{use.uv_offset.x};
+      v = -s * x + c * y + double{use.uv_offset.y};
+    }
+    uvs[i] = static_cast<float>(u), uvs[i + 1] = static_cast<float>(1.0 - v);
+  }
+}
+
+} // namespace
+
+void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh_value,
+                        const Value& primitive) {
+  DirectiveFeed& feed = document.context().feed;
+  const uint64_t mode = primitive.find_integer("mode").value_or(4);
+  if (mode < 4) return feed.reporter().warning(document.place(), "points and lines have no surface; they are left out");
+  if (mode > 6) primitive.fail("has an unknown mode");
+  const MaterialUse& use = materials.use(primitive.find_integer("material"));
+  const std::string uv_name = "TEXCOORD_" + std::to_string(use.uv_set);
+  const std::optional<Value> draco = primitive.extension("KHR_draco_mesh_compression");
+  PrimitiveMesh mesh =
+      draco ? read_draco(document, primitive, *draco, uv_name) : read_plain(document, primitive, uv_name);
+  if (mesh.positions.empty()) primitive.fail("has no positions");
+  morph(document, mesh_value, primitive, mesh);
+  // Draco's decoder turns strips into triangles.
+  const std::vector<int32_t> indices = triangles_of(mesh, draco ? Mode::kTriangles : Mode{mode}, primitive);
+  if (indices.empty()) return;
+  convert_uvs(mesh.uvs, use);
+
+  const Place place = document.place();
+  feed.begin("AttributeBegin", place);
+  feed.send();
+  if (use.name.empty())
+    feed.begin("Material", place, {"matte"});
+  else
+    feed.begin("NamedMaterial", place, {use.name});
+  feed.send();
+  if (use.emission != Vec3(0.0f)) {
+    feed.begin("AreaLightSource", place, {"diffuse"});
+    feed.colour("L", use.emission);
+    feed.send();
+  }
+  feed.begin("Shape", place, {"trianglemesh"});
+  feed.floats(ParameterType::kPoint3, "P", mesh.positions);
+  if (!mesh.normals.empty()) feed.floats(ParameterType::kNormal, "N", mesh.normals);
+  if (!mesh.uvs.empty()) feed.floats(ParameterType::kFloat, "uv", mesh.uvs);
+  feed.integers("indices", indices);
+  if (use.absent)
+    feed.number("alpha", 0.0f);
+  else if (!use.opacity.empty())
+    feed.texture("alpha", use.opacity);
+  feed.send();
+  feed.begin("AttributeEnd", place);
+  feed.send();
+}
+
+} // namespace packtrace::gltf
