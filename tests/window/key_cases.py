@@ -1,0 +1,146 @@
+"""Keys and mouse."""
+
+import os
+import struct
+
+from viewer import wait_until
+from window_case import WindowTest
+
+
+class Keys(WindowTest):
+    def test_held_keys_fly(self):
+        viewer = self.open(self.file("room"))
+        start = viewer.camera()
+        cameras = {start}
+        for key in "wsadqe":
+            viewer.hold(key)
+            viewer.moving()
+            viewer.release(key)
+            camera = viewer.camera()
+            self.assertNotIn(camera, cameras, key)
+            cameras.add(camera)
+        self.expect_bytes_of_render(*viewer.screenshot())
+        viewer.press("Home")
+        self.assertEqual(viewer.camera(), start)
+        viewer.press("F")
+        self.assertNotIn(viewer.camera(), cameras)
+        self.end(viewer)
+
+    def test_the_mouse_moves_the_camera(self):
+        viewer = self.open(self.file("room"))
+        viewer.press("BackSpace")
+        cameras = {viewer.camera()}
+        for button in (1, 2, 3):
+            viewer.drag((150, 90), (190, 80), button)
+            camera = viewer.camera()
+            self.assertNotIn(camera, cameras, f"button {button}")
+            cameras.add(camera)
+        self.end(viewer)
+
+    def test_number_keys_choose_views(self):
+        viewer = self.open(self.file("room"))
+        for key, words in (("0", "--ground-truth"), ("1", "--aov ao_raw"), ("2", "--aov ao"), ("3", "--aov shaded"),
+                           ("Return", "--aov albedo"), ("Return", "--aov shaded")):
+            viewer.press(key)
+            command = viewer.shown()
+            self.assertTrue(words in command.removesuffix(" --aov ao") if key == "0" else command.endswith(words), command)
+        long_rays = viewer.shown()
+        viewer.press("4")
+        self.assertIn("--ao-set radius=", viewer.shown())
+        viewer.press("4")
+        self.assertNotIn("--ao-set", viewer.shown())
+        self.assertNotIn("--ao-set", long_rays)
+        viewer.still(2)
+        self.expect_bytes_of_render(*viewer.screenshot())
+        self.end(viewer)
+
+    def test_orbit_pause_and_motion(self):
+        viewer = self.open(self.file("moving"))
+        viewer.press("c")
+        viewer.moving()
+        viewer.press("space")
+        viewer.still(3)
+        viewer.press("space")
+        viewer.moving()
+        viewer.press("c")
+        viewer.still(3)
+        viewer.press("t")
+        viewer.moving()
+        viewer.press("space")
+        viewer.still(3)
+        command, files = viewer.screenshot()
+        self.assertIn("--start-time", command)
+        self.expect_bytes_of_render(command, files)
+        viewer.press("t")
+        viewer.still(3)
+        self.assertNotIn("--start-time", viewer.screenshot()[0])
+        self.end(viewer)
+
+    def test_what_does_not_move_says_so(self):
+        viewer = self.open(self.file("room"))
+        viewer.press("t")
+        self.assertIn("nothing moves in", viewer.message("room.ptk"))
+        viewer.press("n")
+        viewer.message("no such key: n")
+        self.end(viewer)
+
+    def test_recorded_paths_are_played_by_render(self):
+        viewer = self.open(self.file("room"))
+        viewer.press("r")
+        viewer.message("recording")
+        viewer.hold("a")
+        viewer.moving()
+        viewer.release("a")
+        viewer.still(1)
+        viewer.press("r")
+        viewer.message("saved room-0001.json")
+        self.end(viewer)
+        done = self.run_words([self.program, "render", self.file("room"), "--path", "room-0001.json", "--frames", "2", "-o",
+                               "frame_%d.png", "--size", "32x18", "-q"])
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_profile_saves_a_table(self):
+        viewer = self.open(self.file("moving"), size="64x36")
+        viewer.press("F9")
+        viewer.message("saved moving-0001.csv")
+        with open(os.path.join(self.folder, "moving-0001.csv"), encoding="utf-8") as file:
+            self.assertEqual(len(file.readlines()), 301)
+        self.end(viewer)
+
+    def test_bookmarks(self):
+        viewer = self.open(self.file("room"))
+        viewer.press("BackSpace")
+        viewer.drag((300, 90), (310, 95), 3)
+        first = viewer.camera()
+        viewer.press("ctrl+F1")
+        viewer.hold("e")
+        viewer.moving()
+        viewer.release("e")
+        self.assertNotEqual(viewer.camera(), first)
+        viewer.press("F1")
+        self.assertEqual(viewer.camera(), first)
+        self.expect_bytes_of_render(*viewer.screenshot())
+        self.end(viewer)
+
+    def test_panels_help_and_full_screen(self):
+        viewer = self.open(self.file("room"), size="640x360")
+        viewer.press("2")
+        viewer.still(4)
+        with_panels = self.screen(viewer)
+        viewer.press("BackSpace")
+        # The picture is denoised occlusion, which is grey; panels have colours.
+        colorful = lambda: any(max(p) - min(p) > 8 for p in struct.iter_unpack("3B", self.screen(viewer)))
+        self.assertTrue(any(max(p) - min(p) > 8 for p in struct.iter_unpack("3B", with_panels)))
+        wait_until("the panels to go", lambda: not colorful())
+        viewer.press("h")
+        wait_until("the help", colorful)
+        viewer.press("h")
+        wait_until("the help to go", lambda: not colorful())
+        viewer.press("alt+Return")
+        wait_until("full screen", lambda: viewer.size() == (self.display.WIDTH, self.display.HEIGHT))
+        wait_until("a picture of it", lambda: f"{self.display.WIDTH} x {self.display.HEIGHT}" in viewer.title())
+        viewer.press("alt+Return")
+        wait_until("the window's size", lambda: viewer.size() == (640, 360))
+        viewer.press("F11")
+        wait_until("full screen", lambda: viewer.size() == (self.display.WIDTH, self.display.HEIGHT))
+        self.end(viewer)
