@@ -46,6 +46,27 @@ class Files(WindowTest):
         self.end(viewer)
 
 
+    def test_dropped_files_are_opened(self):
+        viewer = self.open(self.file("room"))
+        viewer.press("BackSpace")
+        viewer.drop(self.file("textured"))
+        viewer.message("opened " + self.file("textured"))
+        command, files = viewer.screenshot()
+        self.assertEqual(command[2], self.file("textured"))
+        self.expect_bytes_of_render(command, files)
+        garbage = os.path.join(self.folder, "garbage.ptk")
+        with open(garbage, "wb") as file:
+            file.write(b"garbage" * 100)
+        viewer.drop(garbage)
+        self.assertIn("garbage.ptk", viewer.message("the picture shows what was there before"))
+        viewer.drop(self.scene("features/materials.pbrt"))
+        viewer.message("opened " + self.scene("features/materials.pbrt"))
+        self.expect_bytes_of_render(*viewer.screenshot())
+        viewer.press("Next")
+        self.assertEqual(viewer.screenshot()[0][2], self.file("room"))
+        self.end(viewer)
+
+
 class Size(WindowTest):
     def test_resized_while_frames_are_rendered(self):
         viewer = self.open(self.file("room"), "--supersample", "3", "--spp", "8", wait=False)

@@ -11,6 +11,7 @@ import tempfile
 import threading
 import time
 
+from drop import FileDrop
 from pictures import read_xwd
 
 PATIENCE_S = 60  # for whatever takes milliseconds on an idle machine
@@ -70,7 +71,7 @@ class Viewer:
         self.errors = open(os.path.join(folder, "errors.txt"), "w+", encoding="utf-8")
         self.process = subprocess.Popen([program, "view", *arguments, "--size", size], cwd=folder,
                                         env=display.environment, stdout=subprocess.PIPE, stderr=self.errors, text=True)
-        self.lines, self.seen = queue.Queue(), []
+        self.lines, self.seen, self.drops = queue.Queue(), [], []
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
         self.window = wait_until("the window", self._find_window)
@@ -151,6 +152,12 @@ class Viewer:
     def click(self, x, y, count=1):
         self._xdotool("mousemove", x, y, "click", "--repeat", count, "--delay", 50, 1)
 
+    def drop(self, file):
+        """Drops a file on the window."""
+        source = FileDrop(self.display.environment["DISPLAY"], "file://" + file)
+        self.drops.append(source)  # the window answers it until it ends
+        source.drop_on(int(self.window), 100, 100, PATIENCE_S)
+
     def pick(self, x, y):
         """Clicks until the picture stands still. Returns the printed pick, and the command."""
         def clicked():
@@ -202,6 +209,8 @@ class Viewer:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
+        for source in self.drops:
+            source.close()
         self.reader.join(timeout=PATIENCE_S)
         self.process.stdout.close()
         self.errors.close()
