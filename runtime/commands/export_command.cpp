@@ -87,6 +87,7 @@ nlohmann::json to_json(const ExportOptions& options, const GltfReport& r) {
           {"meshes", r.meshes},
           {"primitives", r.primitives},
           {"nodes", r.nodes},
+          {"grouped_instances", r.grouped_instances},
           {"materials", r.materials},
           {"images", r.images},
           {"cameras", r.cameras},
@@ -160,7 +161,8 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
   if (layout == kVertex16 && options.has_gltf_option)
-    throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits only apply to --layout gltf");
+    throw Error(ErrorKind::kUsage,
+                "--codec, --level, --normal-bits, --uv-bits and --instancing only apply to --layout gltf");
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
   refuse_to_replace({options.input});
@@ -213,6 +215,10 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
       ->check(CLI::Range(1, 30))
       ->each(of_gltf)
       ->capture_default_str();
+  verb.add_flag("--instancing", options->gltf.instancing,
+                "Store the instances of a mesh in one node with EXT_mesh_gpu_instancing: much smaller files of many "
+                "instances, for viewers that know the extension")
+      ->each(of_gltf);
   verb.footer("vertex16 packs position (3 x 21 bits), normal (24), tangent (1 + 8) and uv\n"
               "(2 x 16) of a vertex. docs/vertex16.md describes the file;\n"
               "compress/exchange/vertex16/vertex16.glsl and vertex16_decode.h decode it. Positions in glTF\n"

@@ -1,4 +1,5 @@
 #include "compress/exchange/gltf/gltf_export.h"
+#include "compress/exchange/gltf/gltf_instances.h"
 
 #include <algorithm>
 #include <array>
@@ -373,6 +374,55 @@ TEST(GltfExport, RefusesValuesOutOfRange) {
     config.codec = codec;
     EXPECT_THROW(export_of(file, config), Error);
   }
+}
+
+/// Map of an angle about y, scales, and a translation.
+Affine turned(double angle, Vec3 scale, Vec3 translation) {
+  const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
+  return {Vec3(c, 0, -s) * scale.x, Vec3(0, 1, 0) * scale.y, Vec3(s, 0, c) * scale.z, translation};
+}
+
+TEST(GltfInstances, MapsAreDecomposed) {
+  const std::optional<InstanceTransform> found = decompose(turned(0.5, {2, 3, 4}, {5, 6, 7}));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->translation, (std::array<float, 3>{5, 6, 7}));
+  EXPECT_NEAR(found->scale[0], 2.0f, 1e-6f);
+  EXPECT_NEAR(found->scale[2], 4.0f, 1e-6f);
+  EXPECT_NEAR(found->rotation[1], std::sin(0.25), 1e-6);
+  EXPECT_NEAR(found->rotation[3], std::cos(0.25), 1e-6);
+  const std::optional<InstanceTransform> mirrored = decompose(turned(0.5, {1, -1, 1}, {}));
+  ASSERT_TRUE(mirrored);
+  EXPECT_LT(mirrored->scale[0] * mirrored->scale[1] * mirrored->scale[2], 0.0f);
+}
+
+TEST(GltfInstances, ShearAndFlatMapsStayMatrices) {
+  Affine sheared(1.0f);
+  sheared[1].x = 0.01f;
+  EXPECT_FALSE(decompose(sheared));
+  EXPECT_FALSE(decompose(turned(0.5, {1, 0, 1}, {})));
+}
+
+TEST(GltfInstances, ThoseOfAMeshShareANode) {
+  Scene scene = test::scene_of(test::sphere_mesh(12));
+  scene.shapes.clear();
+  scene.objects.push_back({"ball", {Shape{0, 0, false, DAffine(1.0)}}});
+  for (int i = 0; i < 5; ++i)
+    scene.instances.push_back(
+        {0, turned(0.3 * i, Vec3(1.0f + static_cast<float>(i)), {7.0f * static_cast<float>(i), 0, 0})});
+  scene.instances[3].world_from_object[1].x += 0.3f; // shears
+  const BakedScene baked = test::bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  GltfConfig config = plain();
+  const GltfExport apart = export_of(file, config);
+  config.instancing = true;
+  const GltfExport grouped = export_of(file, config);
+  EXPECT_EQ(apart.report.grouped_instances, 0u);
+  EXPECT_EQ(grouped.report.grouped_instances, scene.instances.size() - 1);
+  const tinygltf::Model model = parse(grouped);
+  EXPECT_EQ(model.extensionsRequired, std::vector<std::string>{"EXT_mesh_gpu_instancing"});
+  size_t with_extension = 0;
+  for (const tinygltf::Node& node : model.nodes) with_extension += node.extensions.count("EXT_mesh_gpu_instancing");
+  EXPECT_EQ(with_extension, 1u);
 }
 
 } // namespace

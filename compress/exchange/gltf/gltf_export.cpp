@@ -12,6 +12,7 @@
 #include <tbb/parallel_for.h>
 #include <tiny_gltf.h>
 
+#include "compress/exchange/gltf/gltf_instances.h"
 #include "compress/exchange/gltf/gltf_materials.h"
 #include "compress/exchange/gltf/plain_primitives.h"
 #include "pbrt_import/base/error.h"
@@ -22,7 +23,7 @@ namespace {
 
 constexpr int kMaxDracoBits = 30;
 constexpr double kNear = 1e-4, kFar = 10.0; // near and far planes relative to the scene's diagonal; pbrt has none
-constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+constexpr const char *kDracoExtension = "KHR_draco_mesh_compression", *kInstancing = "EXT_mesh_gpu_instancing";
 
 struct LatticeBox {
   LatticePoint lo{}, hi{};
@@ -100,16 +101,26 @@ public:
     }
   }
 
-  void add_nodes() {
+  /// @param instancing see GltfConfig
+  void add_nodes(bool instancing) {
+    std::map<int, std::vector<InstanceTransform>> groups; // by mesh
     for (const baked::InstanceRecord& instance : file_.instances()) {
       if (templates_[instance.geometry].empty()) continue;
       tinygltf::Node node;
       node.mesh = mesh_of(instance);
       const std::array<float, 12>& m = instance.world_from_object;
+      if (instancing) {
+        const Affine map(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]);
+        if (const std::optional<InstanceTransform> transform = decompose(map)) {
+          groups[node.mesh].push_back(*transform);
+          continue;
+        }
+      }
       if (m != std::array<float, 12>{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0})
         node.matrix = {m[0], m[1], m[2], 0, m[3], m[4], m[5], 0, m[6], m[7], m[8], 0, m[9], m[10], m[11], 1};
       add_node(std::move(node));
     }
+    for (const auto& [mesh, transforms] : groups) add_group(mesh, transforms);
     for (const Camera& camera : file_.cameras()) add_camera(camera);
   }
 
@@ -119,6 +130,7 @@ public:
       return &model_;
     };
     if (has_draco_) require(kDracoExtension)->extensionsRequired.emplace_back(kDracoExtension);
+    if (report_.grouped_instances > 0) require(kInstancing)->extensionsRequired.emplace_back(kInstancing);
     if (!model_.textures.empty()) require("KHR_texture_transform");
     const auto transmits = [](const tinygltf::Material& m) {
       return m.extensions.count("KHR_materials_transmission") > 0;
@@ -200,7 +212,7 @@ private:
       const size_t bytes = values.size() * sizeof(Value);
       accessor.bufferView = append_buffer_view(model_, values.data(), bytes);
       model_.bufferViews.back().target = target;
-      report_.geometry_bytes += bytes;
+      if (target != 0) report_.geometry_bytes += bytes;
     }
     model_.accessors.push_back(std::move(accessor));
     return static_cast<int>(model_.accessors.size() - 1);
@@ -227,6 +239,41 @@ private:
     }
     model_.meshes.push_back(std::move(mesh));
     return place->second;
+  }
+
+  /// Adds a node for all instances of a mesh; a single one needs no extension.
+  void add_group(int mesh, const std::vector<InstanceTransform>& transforms) {
+    tinygltf::Node node;
+    node.mesh = mesh;
+    const InstanceTransform identity;
+    tinygltf::Value::Object attributes;
+    const auto add = [&](const char* name, int type, const auto member, std::vector<double>* single) {
+      const auto& first = transforms.front().*member;
+      std::vector<std::decay_t<decltype(first)>> values;
+      for (const InstanceTransform& transform : transforms) values.push_back(transform.*member);
+      if (std::ranges::all_of(values, [&](const auto& value) { return value == identity.*member; })) return;
+      if (transforms.size() == 1) {
+        single->assign(first.begin(), first.end());
+        return;
+      }
+      tinygltf::Accessor accessor;
+      accessor.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
+      accessor.type = type;
+      attributes[name] = tinygltf::Value(add_accessor(std::move(accessor), values, values.size(), false, 0));
+    };
+    add("TRANSLATION", TINYGLTF_TYPE_VEC3, &InstanceTransform::translation, &node.translation);
+    add("ROTATION", TINYGLTF_TYPE_VEC4, &InstanceTransform::rotation, &node.rotation);
+    add("SCALE", TINYGLTF_TYPE_VEC3, &InstanceTransform::scale, &node.scale);
+    if (transforms.size() > 1) {
+      if (attributes.empty()) { // instances at one place: the extension needs an attribute that has their number
+        for (size_t i = 0; i < transforms.size(); ++i) add_node(tinygltf::Node(node));
+        return;
+      }
+      node.extensions[kInstancing] =
+          tinygltf::Value(tinygltf::Value::Object{{"attributes", tinygltf::Value(std::move(attributes))}});
+      report_.grouped_instances += transforms.size();
+    }
+    add_node(std::move(node));
   }
 
   void add_node(tinygltf::Node&& node) {
@@ -331,7 +378,7 @@ GltfExport export_gltf(const BakedFile& file, const GltfConfig& config, Progress
       for (const EncodedPrimitive& primitive : encoded[g]) result.report.plain_primitives += !primitive.draco;
     document.add_geometry(g, std::move(encoded[g]));
   }
-  document.add_nodes();
+  document.add_nodes(config.instancing);
   result.bytes = document.write();
   return result;
 }

@@ -14,11 +14,15 @@ struct GltfConfig {
   /// Compress with KHR_draco_mesh_compression (required to read the file); false: floats and 32-bit indices.
   bool draco = true;
   DracoConfig codec;
+  /// Store instances of a mesh as one node with EXT_mesh_gpu_instancing (required to read the file) where their maps
+  /// are translation, rotation and scale.
+  bool instancing = false;
 };
 
 /// Statistics of an export.
 struct GltfReport {
   uint64_t meshes = 0, primitives = 0, nodes = 0, materials = 0, images = 0, cameras = 0;
+  uint64_t grouped_instances = 0; ///< in nodes with EXT_mesh_gpu_instancing
   uint64_t vertices = 0, triangles = 0;
   uint64_t geometry_bytes = 0, image_bytes = 0, file_bytes = 0;
   uint64_t collapsed_triangles = 0; ///< triangles with coinciding corners, dropped by Draco
