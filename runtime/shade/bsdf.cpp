@@ -118,7 +118,8 @@ DirectionalAlbedo::DirectionalAlbedo(const SurfaceShading& material) {
     const Vec3 o(std::sqrt(1.0f - cosine * cosine), 0.0f, cosine);
     Vec3 sum(0.0f);
     for (uint32_t j = 0; j < kSide * kSide; ++j) {
-      const Vec2 u((static_cast<float>(j % kSide) + 0.5f) / kSide, (static_cast<float>(j / kSide) + 0.5f) / kSide);
+      const uint32_t column = j % kSide, row = j / kSide;
+      const Vec2 u((static_cast<float>(column) + 0.5f) / kSide, (static_cast<float>(row) + 0.5f) / kSide);
       const Vec3 half = ggx.visible_normal(o, u), i = reflected(o, half);
       if (i.z <= 0.0f) continue;
       sum += surface.reflectance(std::clamp(glm::dot(o, half), 0.0f, 1.0f), material.eta) *

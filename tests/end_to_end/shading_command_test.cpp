@@ -58,7 +58,6 @@ TEST(Shading, ScenesAndFilesGiveTheSamePicture) {
   const ShadedBench bench;
   ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--for", "shading"}).exit_code, 0);
   const std::vector<std::string> exr{"--view", "pbr", "-o", bench / "x.exr", "--no-jitter"};
-  std::string reference;
   for (const char* backend : {"packed", "embree"}) {
     std::vector<std::string> options = exr;
     options.insert(options.end(), {"--backend", backend});

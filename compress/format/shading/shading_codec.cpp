@@ -55,8 +55,10 @@ public:
     return result;
   }
   void number(DVec3& to, double low, double high, const char* what) {
-    for (int c = 0; c < 3; ++c)
-      if (!((to[c] = value<double>()) >= low && to[c] <= high)) throw ShadingFault{what};
+    for (int c = 0; c < 3; ++c) {
+      to[c] = value<double>();
+      if (!(to[c] >= low && to[c] <= high)) throw ShadingFault{what};
+    }
   }
   void number(float& to, float low, float high, const char* what) {
     to = value<float>();

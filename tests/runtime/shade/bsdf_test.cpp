@@ -78,7 +78,8 @@ TEST(GgxDistribution, VisibleNormalsHaveTheirDensity) {
   });
   constexpr int kSide = 300;
   for (int n = 0; n < kSide * kSide; ++n) {
-    const Vec2 u((static_cast<float>(n % kSide) + 0.5f) / kSide, (static_cast<float>(n / kSide) + 0.5f) / kSide);
+    const int column = n % kSide, row = n / kSide;
+    const Vec2 u((static_cast<float>(column) + 0.5f) / kSide, (static_cast<float>(row) + 0.5f) / kSide);
     const Vec3 i = reflected(o, ggx.visible_normal(o, u));
     if (i.z > 0.0f) sampled += double{i.x * i.x} / (kSide * kSide);
   }
