@@ -208,6 +208,7 @@ void FrameThread::publish(double step_ms) {
     shown->pane_files[pane] = s.pane(pane).file;
     shown->settings[pane] = view_settings(s.pane(pane).config);
   }
+  shown->spp = s.rendered_config(0).ao.spp;
   shown->split = s.split(), shown->divider = s.divider(), shown->gain = s.gain();
   shown->speed = controls_->speed(), shown->target_ms = s.target_ms();
   shown->paused = controls_->paused(), shown->plays = controls_->plays(), shown->orbits = controls_->orbits();

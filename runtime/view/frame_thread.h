@@ -28,6 +28,7 @@ struct ViewSnapshot {
   std::vector<std::string> files;
   std::array<std::string, 2> layers;
   std::array<size_t, 2> pane_files{};
+  uint32_t spp = 0; ///< occlusion samples per pixel and frame of the first pane
   std::array<std::vector<ViewSetting>, 2> settings;
   SplitMode split = SplitMode::kOff;
   double divider = 0.5, gain = 8.0, speed = 0.0, target_ms = 0.0;

@@ -13,7 +13,7 @@ class Start(WindowTest):
         viewer = self.open(self.file("room"), wait=False)
         self.assertRegex(viewer.title(), r"packtrace")
         viewer.still(2)
-        self.assertRegex(viewer.title(), r"room\.ptk - packtrace - \d+ fps, [\d.]+ ms - (AVX-512|AVX2|scalar) - 320 x 180 - ")
+        self.assertRegex(viewer.title(), r"room\.ptk - packtrace - \d+ fps, [\d.]+ ms - (AVX-512|AVX2|scalar) - 320 x 180, 1 spp - ")
         colors = set(struct.iter_unpack("3B", self.screen(viewer)))
         self.assertGreater(len(colors), 20)
         self.end(viewer)

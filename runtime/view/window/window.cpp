@@ -275,9 +275,9 @@ void ViewerWindow::State::take_snapshot() {
   panels.add_frame(*shown);
   const ViewFrame& f = shown->frame;
   std::string text =
-      fmt::format("{} - packtrace - {:.0f} fps, {:.1f} ms - {} - {} x {} - {}", shown->files[shown->pane_files[0]],
-                  panels.fps(), shown->frame_ms, device, f.traced.width, f.traced.height,
-                  f.moving ? "moving" : fmt::format("{} frames", f.still_frames));
+      fmt::format("{} - packtrace - {:.0f} fps, {:.1f} ms - {} - {} x {}, {} spp - {}",
+                  shown->files[shown->pane_files[0]], panels.fps(), shown->frame_ms, device, f.traced.width,
+                  f.traced.height, shown->spp, f.moving ? "moving" : fmt::format("{} frames", f.still_frames));
   if (text == title) return;
   title = std::move(text);
   glfwSetWindowTitle(window, title.c_str());
