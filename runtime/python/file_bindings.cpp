@@ -72,7 +72,8 @@ py::dict streams(const py::object& self) {
   const auto add = [&]<typename T>(const char* name, std::span<const T> values) { result[name] = view(values, self); };
   add("geometries", s.geometries), add("clusters", s.clusters), add("payload", s.payload);
   add("materials", s.materials), add("instances", s.instances), add("masks", s.masks);
-  add("mask_words", s.mask_words), add("textures", s.textures), add("texture_bytes", s.texture_bytes), add("shading", s.shading);
+  add("mask_words", s.mask_words), add("textures", s.textures), add("texture_bytes", s.texture_bytes),
+      add("shading", s.shading);
   add("cameras", s.cameras), add("strings", strings), add("summary", s.summary);
   add("material_slots", s.material_slots), add("requirements", s.requirements), add("lod_levels", s.lod_levels);
   add("lod_groups", s.lod_groups), add("lod_links", s.lod_links), add("trees", s.trees);
