@@ -109,6 +109,8 @@ bool PackedSource::may_emit(uint32_t instance) const {
                              [&](uint32_t material) { return materials_[material].shading.emits(); });
 }
 
+bool PackedSource::has_shading() const { return file_.has_shading(); }
+
 AlphaMaskView PackedSource::mask(uint32_t index) const { return file_.mask(index); }
 
 uint64_t PackedSource::resident_bytes() const {

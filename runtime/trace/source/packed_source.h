@@ -49,7 +49,7 @@ public:
   std::span<const Material> materials() const override { return materials_; }
   AlphaMaskView mask(uint32_t index) const override;
   TextureView texture(uint32_t index) const override;
-  bool has_shading() const override { return file_.has_shading(); }
+  bool has_shading() const override;
   std::span<const Light> lights() const override { return shading_.lights; }
   std::span<const EnvironmentMap> environment_maps() const override { return shading_.maps; }
   bool may_emit(uint32_t instance) const override;
