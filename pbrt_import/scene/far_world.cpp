@@ -27,8 +27,10 @@ DVec3 new_zero(const Bounds& box, double limit) {
   // A multiple of a power of two has few bits, so subtracting it is exact. Without an extent, the zero is the box's
   // centre.
   const double unit = diagonal > 0.0 ? std::ldexp(1.0, std::ilogb(diagonal)) : 0.0;
-  if (!(unit > distance * 0x1p-50)) return box.centre();
-  return glm::round(box.centre() / unit) * unit;
+  const DVec3 centre = box.lo * 0.5 + box.hi * 0.5; // lo + hi may overflow
+  if (!(unit > distance * 0x1p-50)) return centre;
+  const DVec3 zero = glm::round(centre / unit) * unit;
+  return is_finite(zero) ? zero : DVec3(0.0);
 }
 
 DAffine moved(DAffine map, DVec3 by) {

@@ -99,5 +99,16 @@ TEST(FarWorld, ZeroThatTheSceneSpansStays) {
   EXPECT_EQ(scene.origin, DVec3(0.0));
 }
 
+TEST(FarWorlds, CentresNearTheEndOfTheRangeStayFinite) {
+  const SceneFolder folder;
+  for (const char* const place : {"1e308 1 0", "1.79e308 -1.79e308 1.79e308", "-1.7e308 0 1e300"}) {
+    const Scene scene = import_world(folder, std::string("Translate ") + place + std::string(kTriangle)).scene;
+    ASSERT_EQ(scene.shapes.size(), 1u) << place;
+    for (int column = 0; column < 4; ++column)
+      EXPECT_TRUE(is_finite(scene.shapes[0].parent_from_mesh[column])) << place;
+    EXPECT_TRUE(is_finite(scene.origin)) << place;
+  }
+}
+
 } // namespace
 } // namespace packtrace
