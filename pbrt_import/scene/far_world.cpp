@@ -30,7 +30,7 @@ DVec3 new_zero(const Bounds& box, double limit) {
   const DVec3 centre = box.lo * 0.5 + box.hi * 0.5; // lo + hi may overflow
   if (!(unit > distance * 0x1p-50)) return centre;
   const DVec3 zero = glm::round(centre / unit) * unit;
-  return is_finite(zero) ? zero : DVec3(0.0);
+  return packtrace::is_finite(zero) ? zero : DVec3(0.0);
 }
 
 DAffine moved(DAffine map, DVec3 by) {
