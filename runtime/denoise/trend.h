@@ -48,7 +48,7 @@ inline uint32_t next_trend(uint32_t bits, float mean, float n) {
   }();
   const Trend before = unpack_trend(bits);
   Trend trend;
-  trend.half = 1 + static_cast<uint32_t>(mean * Trend::kSteps + 0.5f);
+  trend.half = 1 + static_cast<uint32_t>(mean > 0.0f ? mean * Trend::kSteps + 0.5f : 0.5f); // NaN counts as 0
   const auto exponent = static_cast<size_t>((std::bit_cast<uint32_t>(n) >> 23) - 127);
   if (before.half != 0 && exponent >= 2 && exponent < kGrowth.size()) { // two samples say nothing about stratification
     const float change = mean - static_cast<float>(before.half - 1) * (1.0f / Trend::kSteps);

@@ -190,7 +190,7 @@ TEST(GltfMaterials, ColoursMasksAndLight) {
   const SceneFolder folder;
   const auto material = [&](const Json& description) {
     GltfBuilder gltf;
-    gltf.json["materials"] = {description};
+    gltf.json["materials"] = Json::array({description});
     const Json primitive = {{"attributes",
                              {{"POSITION", gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0})},
                               {"TEXCOORD_0", gltf.accessor<float>("VEC2", 5126, {0, 0, 1, 0, 0, 1})}}},
