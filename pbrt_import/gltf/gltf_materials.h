@@ -30,9 +30,6 @@ public:
   const MaterialUse& use(std::optional<uint64_t> material) const;
 
 private:
-  struct Texture {
-    std::string name; ///< of the Texture directive; empty: none
-  };
   void define(const Value& material, MaterialUse& use);
   std::string define_image(const Value& info, MaterialUse& use, std::string_view what, std::optional<float> cutoff);
   void read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset);
