@@ -9,6 +9,7 @@ packages=(
   libtbb-dev libglm-dev libembree-dev libopenexr-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev libjpeg-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
   libdraco-dev libtinygltf-dev libmeshoptimizer-dev # glTF
+  libvulkan-volk-dev libvulkan-dev glslang-tools spirv-tools # backend gpu
 )
 for argument in "$@"; do
   case $argument in
@@ -16,7 +17,7 @@ for argument in "$@"; do
     tests)
       packages+=(
         ccache libgtest-dev libopenmesh-dev python3
-        glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # compile the GLSL of vertex16 and run it on the CPU
+        mesa-vulkan-drivers vulkan-validationlayers # run GLSL on the CPU, with its use of Vulkan checked
         xvfb xdotool libgl1-mesa-dri # the viewer in a window: a display, keys and mouse, OpenGL in software
         dpkg-dev file # Debian packages of packtrace itself
       ) ;;

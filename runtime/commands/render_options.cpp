@@ -54,11 +54,16 @@ void add_frame_options(CLI::App& verb, RenderOptions& options) {
 /// @param baked whether the input is a .ptk file
 Backend choose_backend(const RenderOptions& options, bool baked) {
   const bool needs_embree = options.bvh || options.fast_edges;
+  if (options.gpu_device && options.backend.value_or("gpu") != "gpu")
+    throw Error(ErrorKind::kUsage, "--gpu-device requires --backend gpu");
+  if (options.gpu_device && needs_embree)
+    throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree, --gpu-device requires gpu");
+  if (options.gpu_device) return Backend::kGpu;
   if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
   const std::string& name = *options.backend; // the option's check accepts only known names
   if (name == "embree") return Backend::kEmbree;
   if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
-  return Backend::kPacked;
+  return name == "gpu" ? Backend::kGpu : Backend::kPacked;
 }
 
 } // namespace
@@ -98,9 +103,16 @@ void add_quality_options(CLI::App& verb, RenderOptions& options) {
 void add_tracer_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option(
           "--backend", options.backend,
-          "Ray tracer to use. packed traces the compressed clusters (default for .ptk files); embree traces floats "
-          "(default for .pbrt scenes, and with --bvh or --fast-edges)")
-      ->check(one_of({"packed", "embree"}));
+          "Ray tracer to use. packed traces the compressed clusters (default for .ptk files); gpu does the same on a "
+          "GPU "
+          "with Vulkan and finds the same hits; embree traces floats (default for .pbrt scenes, and with --bvh or "
+          "--fast-edges)")
+      ->check(one_of({"packed", "gpu", "embree"}));
+  verb.add_option(
+          "--gpu-device", options.gpu_device,
+          "Part of the name of the Vulkan device to use, in any case; selects --backend gpu (default: a "
+          "discrete GPU, else another GPU). Devices that run on the CPU, such as llvmpipe, are used by name only")
+      ->type_name("NAME");
   verb.add_option(
           "--bvh,--bvh-quality", options.bvh,
           "Quality of Embree's BVH; selects --backend embree (default medium). high takes longer to build; it traces "
@@ -193,6 +205,7 @@ TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& gl
   const std::string quality = options.bvh.value_or("medium");
   config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false, true,
                    globals.memory};
+  config.gpu.device = options.gpu_device.value_or("");
   return config;
 }
 

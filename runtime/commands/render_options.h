@@ -39,6 +39,7 @@ struct RenderOptions {
   SceneOptions scene;
   uint64_t seed = 0;
   std::optional<std::string> backend; ///< if not set, the input decides
+  std::optional<std::string> gpu_device;
   std::optional<std::string> bvh;
   LodOptions lod;
   SequenceOptions sequence;

@@ -89,6 +89,7 @@ std::string settings_text(const RenderOptions& options, const RenderSetup& setup
       {"ao", ao_values(c.ao)},
       {"camera", options.camera.value_or("")},
       {"backend", options.backend.value_or("")},
+      {"gpu_device", options.gpu_device.value_or("")},
       {"bvh", options.bvh.value_or("")},
       {"fast_edges", options.fast_edges},
       {"lod",

@@ -57,6 +57,7 @@ std::vector<std::string> loading_words(const RenderOptions& o) {
   add("--world", o.scene.world);
   add("--time", o.scene.time);
   add("--backend", o.backend);
+  add("--gpu-device", o.gpu_device);
   add("--bvh", o.bvh);
   if (o.fast_edges) words.emplace_back("--fast-edges");
   add("--lod-error", o.lod.error_px);

@@ -67,6 +67,7 @@ set(packtrace_public_headers
   runtime/denoise/denoiser_config.h
   runtime/denoise/flux_config.h
   runtime/denoise/reference/reference_config.h
+  runtime/gpu/gpu_config.h
   runtime/image/background.h
   runtime/image/exr.h
   runtime/image/false_color.h

@@ -50,8 +50,9 @@ Camera chosen_camera(const SceneSource& source, std::optional<int64_t> index, Im
 
 Backend chosen_backend(const std::string& name) {
   if (name == "packed") return Backend::kPacked;
+  if (name == "gpu") return Backend::kGpu;
   if (name == "embree") return Backend::kEmbree;
-  throw Error(ErrorKind::kUsage, "backend=\"" + name + "\": choose one of packed, embree");
+  throw Error(ErrorKind::kUsage, "backend=\"" + name + "\": choose one of packed, gpu, embree");
 }
 
 /// What render() is told of the denoiser.

@@ -1,19 +1,42 @@
 #include "runtime/trace/make_tracer.h"
 
+#include <string>
+
 #include "pbrt_import/base/error.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#if defined(PACKTRACE_HAS_GPU)
+#include "runtime/trace/gpu/gpu_tracer.h"
+#endif
 
 namespace packtrace {
+namespace {
+
+/// @tparam Source SceneSource or LodSource
+template <typename Source>
+std::unique_ptr<RayTracer> make_gpu_tracer([[maybe_unused]] const Source& source,
+                                           [[maybe_unused]] const BakedFile& file,
+                                           [[maybe_unused]] const TracerConfig& config) {
+#if defined(PACKTRACE_HAS_GPU)
+  return std::make_unique<GpuTracer>(file, source, config.gpu, config.movers);
+#else
+  throw Error(ErrorKind::kUnsupported, "packtrace was built without backend gpu; use --backend packed");
+#endif
+}
+
+} // namespace
 
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config) {
   if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree, config.movers);
   if (file == nullptr)
-    throw Error(ErrorKind::kUnsupported, "backend packed traces baked files only; bake the scene, or use embree");
+    throw Error(ErrorKind::kUnsupported, "backend " + std::string(config.backend == Backend::kGpu ? "gpu" : "packed") +
+                                             " traces baked files only; bake the scene, or use embree");
+  if (config.backend == Backend::kGpu) return make_gpu_tracer(source, *file, config);
   return std::make_unique<PackedTracer>(*file, source, chosen_isa(), config.movers);
 }
 
 std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config) {
   if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree, config.movers);
+  if (config.backend == Backend::kGpu) return make_gpu_tracer(source, file, config);
   return std::make_unique<PackedTracer>(file, source, chosen_isa(), config.movers);
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "runtime/gpu/gpu_config.h"
 #include "runtime/trace/embree/embree_tracer.h"
 
 namespace packtrace {
@@ -13,18 +14,21 @@ class LodSource;
 enum class Backend : uint8_t {
   kEmbree, ///< Embree over triangles decoded to floats
   kPacked, ///< traces the packed clusters of a baked file directly
+  kGpu,    ///< does the same on a GPU with Vulkan
 };
 
 struct TracerConfig {
   Backend backend = Backend::kEmbree;
   EmbreeConfig embree;
   Movers movers = {}; ///< instances that RayTracer::place_instances() may move
+  GpuConfig gpu = {}; ///< of backend gpu
 };
 
-/// Creates a tracer; the only function that knows both backends. Keeps references: source and file must outlive the
+/// Creates a tracer; the only function that knows all backends. Keeps references: source and file must outlive the
 /// tracer.
 /// @param file the file that `source` reads, or null if it reads floats
-/// Throws Error(kUnsupported) for backend packed without a file, else as the backend's constructor.
+/// Throws Error(kUnsupported) for the backends packed and gpu without a file, and for gpu if it was not built; else as
+/// the backend's constructor.
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config);
 
 /// Creates a tracer at the detail of a plan. Throws as the backend's constructor.

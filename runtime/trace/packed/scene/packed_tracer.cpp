@@ -27,9 +27,6 @@ static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) && offsetof(RayHit, t)
               offsetof(RayHit, triangle) == offsetof(packed::KernelHit, triangle));
 static_assert(baked::kVisibleToCamera == kCameraRays && baked::kVisibleToOcclusion == kOcclusionRays);
 
-const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
-  return reinterpret_cast<const packed::KernelRay*>(rays.data());
-}
 void decode_triangle(const packed::Kernels& kernels, const packed::TraceCluster& cluster, uint32_t triangle,
                      Vec3 (&vertices)[3]) {
   float decoded[3][3];
@@ -38,9 +35,13 @@ void decode_triangle(const packed::Kernels& kernels, const packed::TraceCluster&
     vertices[corner] = {decoded[corner][0], decoded[corner][1], decoded[corner][2]};
 }
 
-packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast<packed::KernelHit*>(hits.data()); }
-
 } // namespace
+
+const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
+  return reinterpret_cast<const packed::KernelRay*>(rays.data());
+}
+
+packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast<packed::KernelHit*>(hits.data()); }
 
 /// What deforms: geometries of this tracer's own, or those of another tracer.
 struct PackedTracer::Deformation {
@@ -243,6 +244,14 @@ void PackedTracer::set_tree_search(void (*search)(const void*, const packed::Tre
   tables_->scene.search_tree = search;
   tables_->scene.searcher = searcher;
 }
+
+const packed::KernelScene& PackedTracer::kernel_scene() const { return tables_->scene; }
+
+const TracedTrees& PackedTracer::traced_trees() const { return *tables_; }
+
+const PlacedTrees& PackedTracer::placed_trees() const { return tables_->placed; }
+
+uint32_t PackedTracer::first_instance(uint32_t geometry) const { return tables_->first_instance[geometry]; }
 
 std::span<const baked::TreeRecord> PackedTracer::tree_records() const { return tables_->records; }
 

@@ -11,6 +11,12 @@
 
 namespace packtrace {
 
+class PlacedTrees;
+
+/// An array of rays or hits as kernels read it; the layouts are the same.
+const packed::KernelRay* kernel_rays(std::span<const Ray> rays);
+packed::KernelHit* kernel_hits(std::span<RayHit> hits);
+
 /// Traces a baked file without unpacking it: triangles are decoded from the clusters' bits when rays reach them, and
 /// the boxes are those of the file's trees, or of trees built here if the file has none. See docs/packed_bvh.md.
 class PackedTracer final : public RayTracer {
@@ -92,6 +98,13 @@ public:
   /// The trees, the file's or built here, by number.
   std::span<const baked::TreeRecord> tree_records() const;
   std::span<const packed::TraceTree> trees() const;
+
+  /// What the kernels read, for other tracers of the same trees. Valid until instances or geometry change.
+  const packed::KernelScene& kernel_scene() const;
+  const TracedTrees& traced_trees() const;
+  const PlacedTrees& placed_trees() const;
+  /// The first instance of a geometry of the file; a LOD level has that of its base geometry.
+  uint32_t first_instance(uint32_t geometry) const;
 
   /// closest_hits() and any_hits() with statistics, which are added to `counters`. Slower.
   void count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,

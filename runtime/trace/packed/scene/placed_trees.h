@@ -41,6 +41,8 @@ public:
   std::span<const uint32_t> flat_instances() const { return flat_instances_; }
   std::span<const Affine> world_from_object() const { return world_from_object_; }
   size_t count() const { return placements_.size(); }
+  /// The tree over placements, root first; empty for a single one.
+  std::span<const packed::TopNode> top_nodes() const { return top_; }
   /// Levels of nodes of the tree over placements if rays traverse it as streams, else 0.
   uint32_t stream_depth() const { return stream_depth_; }
   uint64_t bytes() const;

@@ -75,6 +75,15 @@ packed::TraceCluster trace_cluster(const baked::TreeRecord& tree, const baked::G
   return out;
 }
 
+void decode_vertices_exactly(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
+                             const ClusterView& cluster, std::vector<float>& out) {
+  const Shifts by = shifts(tree, geometry);
+  for (uint32_t v = 0; v < cluster.vertex_count(); ++v) {
+    const LatticePoint q = cluster.lattice(v);
+    for (size_t axis = 0; axis < 3; ++axis) out.push_back(tree_coordinate(q[axis], tree.origin[axis], by));
+  }
+}
+
 uint32_t decode_batch_exactly(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
                               const ClusterView& cluster, uint32_t first, uint32_t count, packed::DecodedBatch& out) {
   count = std::min(count, packed::kBatch);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <span>
+#include <vector>
 
 #include "compress/format/file/baked_file.h"
 #include "compress/format/layout/packed_node.h"
@@ -17,5 +17,9 @@ packed::TraceCluster trace_cluster(const baked::TreeRecord& tree, const baked::G
 /// Decodes up to packed::kBatch triangles of any cluster, each coordinate rounded once; returns their number.
 uint32_t decode_batch_exactly(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
                               const ClusterView& cluster, uint32_t first, uint32_t count, packed::DecodedBatch& out);
+
+/// Appends the vertices of any cluster in the tree's grid, three floats each, each coordinate rounded once.
+void decode_vertices_exactly(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
+                             const ClusterView& cluster, std::vector<float>& out);
 
 } // namespace packtrace

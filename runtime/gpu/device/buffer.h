@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "runtime/gpu/device/device.h"
+
+namespace packtrace::gpu {
+
+enum class BufferPlace : uint8_t {
+  kDevice, ///< fast for kernels
+  kHost,   ///< mapped; kernels can read and write it
+};
+
+/// A storage buffer. Bytes are not initialised.
+class Buffer {
+public:
+  Buffer() = default;
+  /// @param what stands for the buffer in messages
+  /// Throws Error(kLimitExceeded) with the bytes needed and there, and Error(kUnsupported) for more bytes than a
+  /// kernel can address in one buffer.
+  Buffer(std::shared_ptr<Device> device, uint64_t bytes, BufferPlace place, const char* what);
+  ~Buffer();
+  Buffer(Buffer&& other) noexcept { swap(other); }
+  Buffer& operator=(Buffer&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+
+  VkBuffer handle() const { return buffer_; }
+  uint64_t bytes() const { return bytes_; }
+  /// kHost only.
+  std::byte* data() const { return mapped_; }
+  template <typename T>
+  T* as() const {
+    return reinterpret_cast<T*>(mapped_);
+  }
+
+private:
+  void swap(Buffer& other) noexcept;
+  void allocate(BufferPlace place, const char* what);
+
+  std::shared_ptr<Device> device_;
+  VkBuffer buffer_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  uint64_t bytes_ = 0, allocated_ = 0;
+  std::byte* mapped_ = nullptr;
+};
+
+/// A buffer on the device with the given bytes, and `extra_bytes` zeros behind them.
+Buffer upload(const std::shared_ptr<Device>& device, std::span<const std::byte> bytes, const char* what,
+              uint64_t extra_bytes = 0);
+/// Overwrites bytes of a buffer on the device.
+void update(const std::shared_ptr<Device>& device, const Buffer& buffer, uint64_t offset,
+            std::span<const std::byte> bytes);
+/// Reads bytes of a buffer on the device.
+void download(const std::shared_ptr<Device>& device, const Buffer& buffer, uint64_t offset, std::span<std::byte> bytes);
+
+} // namespace packtrace::gpu

@@ -1,0 +1,98 @@
+#include "runtime/gpu/device/device.h"
+
+#include <chrono>
+#include <limits>
+
+#include "pbrt_import/base/error.h"
+#include "runtime/gpu/device/buffer.h"
+#include "runtime/gpu/device/kernel.h"
+
+namespace packtrace::gpu {
+
+void check(VkResult result, const char* call) {
+  if (result == VK_SUCCESS) return;
+  if (result == VK_ERROR_DEVICE_LOST) throw DeviceLost(std::string("the GPU stopped working during ") + call);
+  throw Error(ErrorKind::kUnsupported, std::string("backend gpu: ") + call + " failed with VkResult " +
+                                           std::to_string(static_cast<int>(result)));
+}
+
+/// Records commands, submits them and waits. Returns their time on the device, or on CPU devices that of the host, in
+/// ms.
+template <typename Record>
+double Device::submit(const Record& record) {
+  const std::lock_guard lock(queue_mutex_);
+  check(vkResetCommandPool(device_, pool_, 0), "vkResetCommandPool");
+  const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr,
+                                       VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT, nullptr};
+  check(vkBeginCommandBuffer(commands_, &begin), "vkBeginCommandBuffer");
+  if (queries_ != VK_NULL_HANDLE) {
+    vkCmdResetQueryPool(commands_, queries_, 0, 2);
+    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, queries_, 0);
+  }
+  record(commands_);
+  if (queries_ != VK_NULL_HANDLE) vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_, 1);
+  const VkMemoryBarrier visible{VK_STRUCTURE_TYPE_MEMORY_BARRIER, nullptr, VK_ACCESS_MEMORY_WRITE_BIT,
+                                VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT | VK_ACCESS_HOST_READ_BIT};
+  vkCmdPipelineBarrier(commands_, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT,
+                       VK_PIPELINE_STAGE_ALL_COMMANDS_BIT | VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &visible, 0, nullptr, 0,
+                       nullptr);
+  check(vkEndCommandBuffer(commands_), "vkEndCommandBuffer");
+  VkSubmitInfo submit{};
+  submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+  submit.commandBufferCount = 1;
+  submit.pCommandBuffers = &commands_;
+  const auto before = std::chrono::steady_clock::now();
+  check(vkQueueSubmit(queue_, 1, &submit, fence_), "vkQueueSubmit");
+  check(vkWaitForFences(device_, 1, &fence_, VK_TRUE, std::numeric_limits<uint64_t>::max()), "vkWaitForFences");
+  check(vkResetFences(device_, 1, &fence_), "vkResetFences");
+  const double wall_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count();
+  if (queries_ == VK_NULL_HANDLE || on_cpu()) return wall_ms;
+  uint64_t stamps[2] = {};
+  check(vkGetQueryPoolResults(device_, queries_, 0, 2, sizeof stamps, stamps, sizeof stamps[0],
+                              VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
+        "vkGetQueryPoolResults");
+  return static_cast<double>(stamps[1] - stamps[0]) * double{limits().timestampPeriod} * 1e-6;
+}
+
+double Device::run(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups) {
+  return submit([&](VkCommandBuffer commands) {
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline_);
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout_, 0, 1, &kernel.set_, 0, nullptr);
+    if (!push.empty())
+      vkCmdPushConstants(commands, kernel.layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, static_cast<uint32_t>(push.size()),
+                         push.data());
+    vkCmdDispatch(commands, groups, 1, 1);
+  });
+}
+
+double Device::copy(const Buffer& from, const Buffer& to, uint64_t from_offset, uint64_t to_offset, uint64_t bytes) {
+  return submit([&](VkCommandBuffer commands) {
+    const VkBufferCopy region{from_offset, to_offset, bytes};
+    vkCmdCopyBuffer(commands, from.handle(), to.handle(), 1, &region);
+  });
+}
+
+void Device::fill(const Buffer& buffer, uint32_t word) {
+  submit([&](VkCommandBuffer commands) { vkCmdFillBuffer(commands, buffer.handle(), 0, VK_WHOLE_SIZE, word); });
+}
+
+uint64_t Device::memory_bytes() const {
+  uint64_t bytes = 0;
+  for (uint32_t i = 0; i < memory_.memoryHeapCount; ++i)
+    if ((memory_.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT) != 0) bytes += memory_.memoryHeaps[i].size;
+  if (config_.memory_limit_bytes != 0 && config_.memory_limit_bytes < bytes) return config_.memory_limit_bytes;
+  return bytes;
+}
+
+uint32_t Device::memory_type(uint32_t allowed, bool host_visible) const {
+  constexpr VkMemoryPropertyFlags kHost = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+  const VkMemoryPropertyFlags wanted[2] = {host_visible ? kHost | VK_MEMORY_PROPERTY_HOST_CACHED_BIT
+                                                        : VkMemoryPropertyFlags{VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT},
+                                           host_visible ? kHost : VkMemoryPropertyFlags{0}};
+  for (const VkMemoryPropertyFlags flags : wanted)
+    for (uint32_t i = 0; i < memory_.memoryTypeCount; ++i)
+      if (((allowed >> i) & 1u) != 0 && (memory_.memoryTypes[i].propertyFlags & flags) == flags) return i;
+  throw Error(ErrorKind::kUnsupported, "backend gpu: the device has no memory of a kind that is needed");
+}
+
+} // namespace packtrace::gpu

@@ -1,0 +1,108 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "runtime/gpu/device/vulkan_api.h"
+#include "runtime/gpu/gpu_config.h"
+
+namespace packtrace::gpu {
+
+class Buffer;
+class Kernel;
+
+/// The device stopped working; nothing that was on it can be read any more. Not an Error: the program's state is lost.
+class DeviceLost : public std::runtime_error {
+public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws DeviceLost, or Error that names the call, unless the result is VK_SUCCESS.
+void check(VkResult result, const char* call);
+
+/// What kernels must know of a device.
+struct DeviceTraits {
+  bool fused_floats = false;  ///< fma() of floats rounds once, refined division is right, nothing is contracted
+  bool fused_doubles = false; ///< fma() of doubles rounds once
+  bool half_bytes = false;    ///< denormal halves convert exactly
+  uint32_t subgroup_size = 0; ///< lanes
+  bool partitioned = false;   ///< VK_NV_shader_subgroup_partitioned
+};
+
+/// An open Vulkan device with one compute queue. All functions may be called from several threads.
+class Device {
+public:
+  /// Throws Error(kUnsupported) if there is no loader, or no device with the features that kernels need.
+  static std::shared_ptr<Device> open(const GpuConfig& config);
+  /// The device that another call with an equal configuration opened and that is still in use, else open().
+  static std::shared_ptr<Device> share(const GpuConfig& config);
+  ~Device();
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  const GpuConfig& config() const { return config_; }
+  std::string name() const { return properties_.deviceName; }
+  bool on_cpu() const { return properties_.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU; }
+  const VkPhysicalDeviceLimits& limits() const { return properties_.limits; }
+  const DeviceTraits& traits() const { return traits_; }
+  VkDevice handle() const { return device_; }
+
+  /// Runs a kernel and waits. Returns its time in ms.
+  /// @param push push constants
+  /// Throws DeviceLost.
+  double run(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups);
+  /// Copies bytes between buffers and waits. Returns the time in ms.
+  double copy(const Buffer& from, const Buffer& to, uint64_t from_offset, uint64_t to_offset, uint64_t bytes);
+  /// Sets all words of a buffer and waits.
+  void fill(const Buffer& buffer, uint32_t word);
+
+  /// Bytes of all buffers.
+  uint64_t allocated_bytes() const { return allocated_; }
+  /// Bytes that buffers may have: those of the device's memory, or GpuConfig::memory_limit_bytes if that is less.
+  uint64_t memory_bytes() const;
+
+  /// Messages of the validation layer so far. Empty without GpuConfig::validation.
+  std::vector<std::string> validation_messages() const;
+  /// Whether the validation layer was asked for and found.
+  bool validates() const { return messenger_ != VK_NULL_HANDLE; }
+
+private:
+  friend class Buffer;
+
+  explicit Device(const GpuConfig& config) : config_(config) {}
+  void create_instance();
+  void choose_device();
+  void create_device();
+  uint32_t memory_type(uint32_t allowed, bool host_visible) const;
+  template <typename Record>
+  double submit(const Record& record);
+
+  const GpuConfig config_;
+  VkInstance instance_ = VK_NULL_HANDLE;
+  VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  VkPhysicalDevice physical_ = VK_NULL_HANDLE;
+  VkPhysicalDeviceProperties properties_{};
+  VkPhysicalDeviceMemoryProperties memory_{};
+  uint32_t family_ = 0;
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkQueue queue_ = VK_NULL_HANDLE;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  VkFence fence_ = VK_NULL_HANDLE;
+  VkQueryPool queries_ = VK_NULL_HANDLE;
+  DeviceTraits traits_;
+  std::mutex queue_mutex_;
+  std::atomic<uint64_t> allocated_ = 0;
+};
+
+/// The names of all Vulkan devices, as GpuConfig::device finds them, with a note for those that lack features. Throws
+/// Error(kUnsupported) without a loader.
+std::vector<std::string> device_names(const GpuConfig& config);
+
+} // namespace packtrace::gpu

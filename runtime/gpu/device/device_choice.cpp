@@ -1,0 +1,276 @@
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "pbrt_import/base/error.h"
+#include "runtime/gpu/device/device.h"
+#include "runtime/gpu/device/loader.h"
+#include "runtime/gpu/device/rounding_probe.h"
+
+namespace packtrace::gpu {
+namespace {
+
+constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
+constexpr uint32_t kNeededBindings = 16;
+
+std::vector<VkPhysicalDevice> physical_devices(VkInstance instance) {
+  uint32_t count = 0;
+  check(vkEnumeratePhysicalDevices(instance, &count, nullptr), "vkEnumeratePhysicalDevices");
+  std::vector<VkPhysicalDevice> devices(count);
+  if (count > 0) check(vkEnumeratePhysicalDevices(instance, &count, devices.data()), "vkEnumeratePhysicalDevices");
+  devices.resize(count);
+  return devices;
+}
+
+VkPhysicalDeviceProperties properties_of(VkPhysicalDevice device) {
+  VkPhysicalDeviceProperties properties;
+  vkGetPhysicalDeviceProperties(device, &properties);
+  return properties;
+}
+
+bool has_extension(VkPhysicalDevice device, const char* name) {
+  uint32_t count = 0;
+  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> extensions(count);
+  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data());
+  return std::ranges::any_of(extensions, [&](const auto& e) { return std::strcmp(e.extensionName, name) == 0; });
+}
+
+/// The first queue family that computes; none: the number of families.
+uint32_t compute_family(VkPhysicalDevice device, std::vector<VkQueueFamilyProperties>& families) {
+  uint32_t count = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
+  families.resize(count);
+  vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+  uint32_t family = 0;
+  while (family < count && (families[family].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) ++family;
+  return family;
+}
+
+/// What a device lacks that kernels need; empty if nothing.
+std::string missing_features(VkPhysicalDevice device) {
+  const VkPhysicalDeviceProperties properties = properties_of(device);
+  if (properties.apiVersion < VK_API_VERSION_1_2) return "Vulkan 1.2";
+  VkPhysicalDeviceSubgroupProperties subgroups{};
+  subgroups.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES;
+  VkPhysicalDeviceProperties2 more{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &subgroups, {}};
+  vkGetPhysicalDeviceProperties2(device, &more);
+  VkPhysicalDeviceFeatures features;
+  vkGetPhysicalDeviceFeatures(device, &features);
+  constexpr VkSubgroupFeatureFlags kOperations = VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_VOTE_BIT |
+                                                 VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT |
+                                                 VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
+  std::string missing;
+  const auto need = [&](bool there, const char* name) {
+    if (!there) missing += (missing.empty() ? "" : ", ") + std::string(name);
+  };
+  need(features.shaderInt64 == VK_TRUE, "shaderInt64");
+  need(features.shaderFloat64 == VK_TRUE, "shaderFloat64");
+  need((subgroups.supportedOperations & kOperations) == kOperations, "subgroup ballot, shuffle and arithmetic");
+  need(properties.limits.maxPerStageDescriptorStorageBuffers >= kNeededBindings, "16 storage buffers");
+  std::vector<VkQueueFamilyProperties> families;
+  need(compute_family(device, families) < families.size(), "compute queue");
+  return missing;
+}
+
+std::string lower_case(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+/// Higher is better; 0: only by name.
+int rank(VkPhysicalDeviceType type) {
+  switch (type) {
+  case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+    return 3;
+  case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+    return 2;
+  case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+    return 1;
+  default:
+    return 0;
+  }
+}
+
+/// Messages of all devices of the process.
+struct Messages {
+  std::mutex mutex;
+  std::vector<std::string> texts;
+};
+Messages& messages() {
+  static Messages all;
+  return all;
+}
+
+VkBool32 VKAPI_PTR add_message(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+                               const VkDebugUtilsMessengerCallbackDataEXT* data, void*) {
+  const std::lock_guard lock(messages().mutex);
+  messages().texts.emplace_back(data->pMessage);
+  return VK_FALSE;
+}
+
+bool has_validation_layer() {
+  uint32_t count = 0;
+  vkEnumerateInstanceLayerProperties(&count, nullptr);
+  std::vector<VkLayerProperties> layers(count);
+  vkEnumerateInstanceLayerProperties(&count, layers.data());
+  return std::ranges::any_of(layers, [](const auto& l) { return std::strcmp(l.layerName, kValidationLayer) == 0; });
+}
+
+} // namespace
+
+std::vector<std::string> Device::validation_messages() const {
+  const std::lock_guard lock(messages().mutex);
+  return messages().texts;
+}
+
+void Device::create_instance() {
+  VkApplicationInfo application{};
+  application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+  application.pApplicationName = "packtrace";
+  application.apiVersion = VK_API_VERSION_1_2;
+  VkInstanceCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+  info.pApplicationInfo = &application;
+  const bool validates = config_.validation && has_validation_layer();
+  const char* const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+  if (validates) {
+    info.enabledLayerCount = 1, info.ppEnabledLayerNames = &kValidationLayer;
+    info.enabledExtensionCount = 1, info.ppEnabledExtensionNames = &extension;
+  }
+  if (vkCreateInstance(&info, nullptr, &instance_) != VK_SUCCESS)
+    throw Error(ErrorKind::kUnsupported, no_device_message("no Vulkan driver found"));
+  volkLoadInstance(instance_);
+  if (!validates) return;
+  VkDebugUtilsMessengerCreateInfoEXT messenger{};
+  messenger.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
+  messenger.messageSeverity =
+      VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+  messenger.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+  messenger.pfnUserCallback = add_message;
+  check(vkCreateDebugUtilsMessengerEXT(instance_, &messenger, nullptr, &messenger_), "vkCreateDebugUtilsMessengerEXT");
+}
+
+void Device::choose_device() {
+  const std::string wanted = lower_case(config_.device);
+  int best = -1;
+  std::string lacking;
+  for (const VkPhysicalDevice device : physical_devices(instance_)) {
+    const VkPhysicalDeviceProperties properties = properties_of(device);
+    if (!wanted.empty() && lower_case(properties.deviceName).find(wanted) == std::string::npos) continue;
+    const int value = rank(properties.deviceType);
+    if (wanted.empty() && value == 0) continue;
+    if (const std::string missing = missing_features(device); !missing.empty()) {
+      lacking += (lacking.empty() ? "" : "; ") + std::string(properties.deviceName) + " lacks " + missing;
+      continue;
+    }
+    if (value > best) best = value, physical_ = device;
+  }
+  if (best < 0)
+    throw Error(ErrorKind::kUnsupported,
+                no_device_message(!lacking.empty() ? "no usable Vulkan device found: " + lacking
+                                  : wanted.empty()
+                                      ? "no Vulkan device found that is a GPU"
+                                      : "no Vulkan device with \"" + config_.device + "\" in its name found"));
+  properties_ = properties_of(physical_);
+  vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
+}
+
+void Device::create_device() {
+  std::vector<VkQueueFamilyProperties> families;
+  family_ = compute_family(physical_, families);
+  const float priority = 1.0f;
+  VkDeviceQueueCreateInfo queue{};
+  queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
+  queue.queueFamilyIndex = family_;
+  queue.queueCount = 1;
+  queue.pQueuePriorities = &priority;
+  VkPhysicalDeviceFeatures features{};
+  features.shaderInt64 = VK_TRUE, features.shaderFloat64 = VK_TRUE;
+  VkDeviceCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
+  info.queueCreateInfoCount = 1;
+  info.pQueueCreateInfos = &queue;
+  info.pEnabledFeatures = &features;
+  const char* const partitioned = VK_NV_SHADER_SUBGROUP_PARTITIONED_EXTENSION_NAME;
+  traits_.partitioned = has_extension(physical_, partitioned);
+  if (traits_.partitioned) info.enabledExtensionCount = 1, info.ppEnabledExtensionNames = &partitioned;
+  check(vkCreateDevice(physical_, &info, nullptr, &device_), "vkCreateDevice");
+  vkGetDeviceQueue(device_, family_, 0, &queue_);
+  const VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0, family_};
+  check(vkCreateCommandPool(device_, &pool, nullptr, &pool_), "vkCreateCommandPool");
+  const VkCommandBufferAllocateInfo commands{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr, pool_,
+                                             VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
+  check(vkAllocateCommandBuffers(device_, &commands, &commands_), "vkAllocateCommandBuffers");
+  const VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
+  check(vkCreateFence(device_, &fence, nullptr, &fence_), "vkCreateFence");
+  if (families[family_].timestampValidBits == 0) return;
+  VkQueryPoolCreateInfo queries{};
+  queries.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
+  queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
+  queries.queryCount = 2;
+  check(vkCreateQueryPool(device_, &queries, nullptr, &queries_), "vkCreateQueryPool");
+}
+
+Device::~Device() {
+  if (device_ != VK_NULL_HANDLE) {
+    vkDestroyQueryPool(device_, queries_, nullptr);
+    vkDestroyFence(device_, fence_, nullptr);
+    vkDestroyCommandPool(device_, pool_, nullptr);
+    vkDestroyDevice(device_, nullptr);
+  }
+  if (messenger_ != VK_NULL_HANDLE) vkDestroyDebugUtilsMessengerEXT(instance_, messenger_, nullptr);
+  if (instance_ != VK_NULL_HANDLE) vkDestroyInstance(instance_, nullptr);
+}
+
+std::shared_ptr<Device> Device::open(const GpuConfig& config) {
+  open_loader(config.loader);
+  std::shared_ptr<Device> device(new Device(config));
+  device->create_instance();
+  device->choose_device();
+  device->create_device();
+  VkPhysicalDeviceSubgroupProperties subgroups{};
+  subgroups.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES;
+  VkPhysicalDeviceProperties2 more{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &subgroups, {}};
+  vkGetPhysicalDeviceProperties2(device->physical_, &more);
+  device->traits_.subgroup_size = subgroups.subgroupSize;
+  if (config.arithmetic == GpuArithmetic::kProbed) probe_rounding(device, device->traits_);
+  return device;
+}
+
+std::shared_ptr<Device> Device::share(const GpuConfig& config) {
+  static std::mutex mutex;
+  static std::vector<std::weak_ptr<Device>> opened;
+  const std::lock_guard lock(mutex);
+  std::erase_if(opened, [](const std::weak_ptr<Device>& device) { return device.expired(); });
+  for (const std::weak_ptr<Device>& weak : opened)
+    if (const std::shared_ptr<Device> device = weak.lock(); device && device->config() == config) return device;
+  const std::shared_ptr<Device> device = open(config);
+  opened.push_back(device);
+  return device;
+}
+
+std::vector<std::string> device_names(const GpuConfig& config) {
+  open_loader(config.loader);
+  VkApplicationInfo application{};
+  application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+  application.apiVersion = VK_API_VERSION_1_2;
+  VkInstanceCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+  info.pApplicationInfo = &application;
+  VkInstance instance = VK_NULL_HANDLE;
+  if (vkCreateInstance(&info, nullptr, &instance) != VK_SUCCESS) return {};
+  volkLoadInstance(instance);
+  std::vector<std::string> names;
+  for (const VkPhysicalDevice device : physical_devices(instance)) {
+    const std::string missing = missing_features(device);
+    names.push_back(properties_of(device).deviceName + (missing.empty() ? std::string() : " (lacks " + missing + ")"));
+  }
+  vkDestroyInstance(instance, nullptr);
+  return names;
+}
+
+} // namespace packtrace::gpu

@@ -1,0 +1,83 @@
+#include "runtime/gpu/device/kernel.h"
+
+#include <utility>
+#include <vector>
+
+#include "runtime/gpu/device/buffer.h"
+
+namespace packtrace::gpu {
+
+Kernel::Kernel(std::shared_ptr<Device> device, std::span<const uint32_t> spirv, std::span<const uint32_t> constants,
+               uint32_t bindings, uint32_t push_bytes)
+    : device_(std::move(device)) {
+  create_layout(bindings, push_bytes);
+  create_pipeline(spirv, constants);
+}
+
+void Kernel::create_layout(uint32_t bindings, uint32_t push_bytes) {
+  const VkDevice device = device_->handle();
+  std::vector<VkDescriptorSetLayoutBinding> buffers;
+  for (uint32_t i = 0; i < bindings; ++i)
+    buffers.push_back({i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+  const VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO, nullptr, 0, bindings,
+                                            buffers.data()};
+  check(vkCreateDescriptorSetLayout(device, &set, nullptr, &set_layout_), "vkCreateDescriptorSetLayout");
+  const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
+  const VkPipelineLayoutCreateInfo layout{
+      VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO, nullptr, 0, 1, &set_layout_, push_bytes > 0 ? 1u : 0u, &push};
+  check(vkCreatePipelineLayout(device, &layout, nullptr, &layout_), "vkCreatePipelineLayout");
+  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, bindings};
+  const VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr, 0, 1, 1, &size};
+  check(vkCreateDescriptorPool(device, &pool, nullptr, &pool_), "vkCreateDescriptorPool");
+  const VkDescriptorSetAllocateInfo allocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, nullptr, pool_, 1,
+                                             &set_layout_};
+  check(vkAllocateDescriptorSets(device, &allocate, &set_), "vkAllocateDescriptorSets");
+}
+
+void Kernel::create_pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants) {
+  const VkDevice device = device_->handle();
+  VkShaderModuleCreateInfo code{};
+  code.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
+  code.codeSize = spirv.size_bytes();
+  code.pCode = spirv.data();
+  VkShaderModule module = VK_NULL_HANDLE;
+  check(vkCreateShaderModule(device, &code, nullptr, &module), "vkCreateShaderModule");
+  std::vector<VkSpecializationMapEntry> entries;
+  for (uint32_t i = 0; i < constants.size(); ++i)
+    entries.push_back({i, i * static_cast<uint32_t>(sizeof(uint32_t)), sizeof(uint32_t)});
+  const VkSpecializationInfo special{static_cast<uint32_t>(entries.size()), entries.data(), constants.size_bytes(),
+                                     constants.data()};
+  VkComputePipelineCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
+  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.module = module;
+  info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &special;
+  info.layout = layout_;
+  const VkResult result = vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_);
+  vkDestroyShaderModule(device, module, nullptr);
+  check(result, "vkCreateComputePipelines");
+}
+
+void Kernel::bind(uint32_t binding, const Buffer& buffer) {
+  const VkDescriptorBufferInfo info{buffer.handle(), 0, VK_WHOLE_SIZE};
+  VkWriteDescriptorSet write{};
+  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+  write.dstSet = set_;
+  write.dstBinding = binding;
+  write.descriptorCount = 1;
+  write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+  write.pBufferInfo = &info;
+  vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
+}
+
+Kernel::~Kernel() {
+  const VkDevice device = device_->handle();
+  vkDestroyPipeline(device, pipeline_, nullptr);
+  vkDestroyPipelineLayout(device, layout_, nullptr);
+  vkDestroyDescriptorPool(device, pool_, nullptr);
+  vkDestroyDescriptorSetLayout(device, set_layout_, nullptr);
+}
+
+} // namespace packtrace::gpu

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <memory>
+
+#include "runtime/gpu/device/device.h"
+
+namespace packtrace::gpu {
+
+/// Runs operations with known results on the device and sets what they show: fused_floats, fused_doubles, half_bytes.
+void probe_rounding(const std::shared_ptr<Device>& device, DeviceTraits& traits);
+
+} // namespace packtrace::gpu

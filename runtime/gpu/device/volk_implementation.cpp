@@ -1,0 +1,3 @@
+#define VK_NO_PROTOTYPES
+#define VOLK_IMPLEMENTATION
+#include <volk.h>

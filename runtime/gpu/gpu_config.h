@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace packtrace {
+
+/// How kernels make float operations that must round once.
+enum class GpuArithmetic : uint8_t {
+  kProbed, ///< the device is asked when it is opened
+  kExact,  ///< emulated by doubles: the same bits on every device
+};
+
+/// Choice of a Vulkan device, and limits. The defaults are right for pictures; the rest serves tests.
+struct GpuConfig {
+  /// Part of the device's name, in any case. Empty: a discrete GPU, else an integrated or virtual one, but never a
+  /// device that runs on the CPU.
+  std::string device;
+  uint64_t memory_limit_bytes = 0; ///< device memory that may be allocated; 0: as much as the device has
+  GpuArithmetic arithmetic = GpuArithmetic::kProbed;
+  double dispatch_ms = 50.0;             ///< time that a dispatch should take at most; work is split accordingly
+  bool validation = false;               ///< Vulkan's validation layer, where it is installed
+  std::string loader = "libvulkan.so.1"; ///< shared library of the Vulkan loader
+
+  bool operator==(const GpuConfig&) const = default;
+};
+
+} // namespace packtrace

@@ -1,0 +1,207 @@
+#include "runtime/gpu/gpu_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <mutex>
+
+#include "runtime/gpu/device/buffer.h"
+#include "runtime/gpu/device/kernel.h"
+#include "runtime/gpu/shaders/spirv.h"
+
+namespace packtrace::gpu {
+namespace {
+
+constexpr uint32_t kSceneBindings = 9, kRaysBinding = 9, kResultsBinding = 10, kBindings = 11;
+constexpr uint32_t kGroupSize = 64;
+constexpr uint32_t kMaxRays = 65535 * kGroupSize; ///< of a dispatch
+constexpr uint32_t kFirstRays = 8192;             ///< of the first dispatch, whose speed is not known
+constexpr uint64_t kPayloadPadding = 16;          ///< kernels read three words from a field's first on
+
+template <typename T>
+Buffer upload_span(const std::shared_ptr<Device>& device, std::span<const T> records, const char* what,
+                   uint64_t extra_bytes = 0) {
+  return upload(device, std::as_bytes(records), what, extra_bytes);
+}
+
+/// Levels of nodes of the tree over placements.
+uint32_t levels_of(std::span<const packed::TopNode> nodes) {
+  std::vector<uint32_t> level(nodes.size(), 1);
+  uint32_t most = 0;
+  for (size_t i = 0; i < nodes.size(); ++i) { // children follow their parents
+    most = std::max(most, level[i]);
+    for (uint32_t slots = nodes[i].slots; slots != 0; slots &= slots - 1)
+      if (const uint32_t child = nodes[i].child[std::countr_zero(slots)]; (child & packed::kTopLeaf) == 0)
+        level[child] = level[i] + 1;
+  }
+  return most;
+}
+
+/// Number of rays of the next dispatch, from the time of the last.
+uint32_t next_rays(uint32_t last, double last_ms, double wanted_ms) {
+  const double factor = std::clamp(wanted_ms / std::max(last_ms, 1e-3), 0.25, 4.0);
+  const double rays = std::clamp(factor * last, double{kGroupSize}, double{kMaxRays});
+  return static_cast<uint32_t>(rays) / kGroupSize * kGroupSize;
+}
+
+} // namespace
+
+struct GpuScene::State {
+  std::shared_ptr<Device> device;
+  bool exact = false;
+  Buffer nodes, clusters, payload, placements, top_nodes, trees, exact_vertices, masks, scene;
+  std::unique_ptr<Kernel> closest, any;
+  uint32_t top_levels = 0;
+  // Of the queries, under the mutex:
+  std::mutex mutex;
+  Buffer rays, results;
+  uint32_t rays_at_once[2] = {kFirstRays, kFirstRays};
+
+  void upload_all(const SceneTables& t);
+  void upload_placements(const SceneTables& t);
+  void make_kernels(const SceneTables& t);
+  std::unique_ptr<Kernel> make_kernel(std::span<const uint32_t> spirv, std::span<const uint32_t> constants) const;
+  void bind_scene(Kernel& kernel) const;
+  std::array<const Buffer*, kSceneBindings> scene_buffers() const {
+    return {&nodes, &clusters, &payload, &placements, &top_nodes, &trees, &exact_vertices, &masks, &scene};
+  }
+  void make_room(uint64_t ray_count, uint64_t result_bytes);
+  template <typename Take>
+  void trace(Kernel& kernel, uint32_t& at_once, std::span<const packed::KernelRay> all, uint32_t ray_class,
+             uint32_t result_bytes, const Take& take);
+};
+
+void GpuScene::State::upload_all(const SceneTables& t) {
+  nodes = upload_span(device, t.nodes, "nodes");
+  clusters = upload_span(device, t.clusters, "clusters");
+  payload = upload_span(device, t.payload, "clusters' bits", kPayloadPadding);
+  trees = upload_span(device, t.trees, "trees");
+  exact_vertices = upload_span(device, t.exact_vertices, "exact vertices");
+  masks = upload_span(device, t.masks, "masks");
+  upload_placements(t);
+}
+
+void GpuScene::State::upload_placements(const SceneTables& t) {
+  std::vector<packed::TracePlacement> all(t.placements.begin(), t.placements.end());
+  all.push_back(t.top);
+  placements = upload_span(device, std::span<const packed::TracePlacement>(all), "placements");
+  top_nodes = upload_span(device, t.top_nodes, "the tree over placements");
+  scene = upload_span(device, std::span<const SceneRecord>(&t.scene, 1), "the scene's record");
+}
+
+void GpuScene::State::make_kernels(const SceneTables& t) {
+  const auto any_tree = [&](uint32_t flags) {
+    return std::ranges::any_of(t.trees, [&](const TreeRecord& tree) { return (tree.flags & flags) != 0; }) ? 1u : 0u;
+  };
+  top_levels = levels_of(t.top_nodes);
+  const DeviceTraits& traits = device->traits();
+  const uint32_t constants[] = {exact ? 1u : 0u,
+                                traits.fused_doubles ? 1u : 0u,
+                                top_levels + t.tree_levels + 1,
+                                t.top_nodes.empty() ? 0u : 1u,
+                                any_tree(kFineTree | kInexactDifferences),
+                                any_tree(kGraded),
+                                t.masks.empty() ? 0u : 1u,
+                                t.exact_vertices.empty() ? 0u : 1u,
+                                traits.half_bytes ? 1u : 0u};
+  closest = make_kernel(spirv::trace_closest(), constants);
+  any = make_kernel(spirv::trace_any(), constants);
+}
+
+std::unique_ptr<Kernel> GpuScene::State::make_kernel(std::span<const uint32_t> spirv,
+                                                     std::span<const uint32_t> constants) const {
+  auto kernel = std::make_unique<Kernel>(device, spirv, constants, kBindings, uint32_t{sizeof(SpanRecord)});
+  bind_scene(*kernel);
+  return kernel;
+}
+
+void GpuScene::State::bind_scene(Kernel& kernel) const {
+  const auto all = scene_buffers();
+  for (uint32_t i = 0; i < kSceneBindings; ++i) kernel.bind(i, *all[i]);
+}
+
+/// Makes room for a dispatch's rays and results, for both kernels.
+void GpuScene::State::make_room(uint64_t ray_count, uint64_t result_bytes) {
+  if (rays.bytes() < ray_count * sizeof(packed::KernelRay)) {
+    rays = Buffer();
+    rays = Buffer(device, ray_count * sizeof(packed::KernelRay), BufferPlace::kHost, "rays");
+  }
+  if (results.bytes() < result_bytes) {
+    results = Buffer();
+    results = Buffer(device, result_bytes, BufferPlace::kHost, "hits");
+  }
+  for (Kernel* kernel : {closest.get(), any.get()}) {
+    kernel->bind(kRaysBinding, rays);
+    kernel->bind(kResultsBinding, results);
+  }
+}
+
+/// @param take function of the first ray, the number of rays and their results
+template <typename Take>
+void GpuScene::State::trace(Kernel& kernel, uint32_t& at_once, std::span<const packed::KernelRay> all,
+                            uint32_t ray_class, uint32_t result_bytes, const Take& take) {
+  const std::lock_guard lock(mutex);
+  for (size_t first = 0; first < all.size();) {
+    const auto count = static_cast<uint32_t>(std::min<size_t>(all.size() - first, at_once));
+    make_room(count, uint64_t{count} * result_bytes);
+    std::memcpy(rays.data(), all.data() + first, count * sizeof(packed::KernelRay));
+    const SpanRecord span{0, count, ray_class, 0};
+    const double ms = device->run(kernel, std::as_bytes(std::span(&span, 1)), (count + kGroupSize - 1) / kGroupSize);
+    take(first, count, results.data());
+    first += count;
+    if (count == at_once || ms > device->config().dispatch_ms)
+      at_once = next_rays(count, ms, device->config().dispatch_ms);
+  }
+}
+
+GpuScene::GpuScene(const GpuConfig& config, const SceneTables& tables) : state_(std::make_unique<State>()) {
+  state_->device = Device::share(config);
+  state_->exact = config.arithmetic == GpuArithmetic::kExact || !state_->device->traits().fused_floats;
+  state_->upload_all(tables);
+  state_->make_kernels(tables);
+}
+
+GpuScene::~GpuScene() = default;
+
+void GpuScene::replace_placements(const SceneTables& tables) {
+  const std::lock_guard lock(state_->mutex);
+  state_->upload_placements(tables);
+  if (levels_of(tables.top_nodes) > state_->top_levels) {
+    state_->make_kernels(tables);
+  } else {
+    state_->bind_scene(*state_->closest);
+    state_->bind_scene(*state_->any);
+  }
+}
+
+void GpuScene::closest(std::span<const packed::KernelRay> rays, uint32_t ray_class,
+                       std::span<packed::KernelHit> hits) const {
+  state_->trace(*state_->closest, state_->rays_at_once[0], rays, ray_class, sizeof(packed::KernelHit),
+                [&](size_t first, uint32_t count, const std::byte* results) {
+                  std::memcpy(hits.data() + first, results, count * sizeof(packed::KernelHit));
+                });
+}
+
+void GpuScene::any(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<uint8_t> occluded) const {
+  state_->trace(*state_->any, state_->rays_at_once[1], rays, ray_class, sizeof(uint32_t),
+                [&](size_t first, uint32_t count, const std::byte* results) {
+                  for (uint32_t i = 0; i < count; ++i)
+                    occluded[first + i] = static_cast<uint8_t>(results[i * sizeof(uint32_t)]);
+                });
+}
+
+std::string GpuScene::device_name() const { return state_->device->name(); }
+bool GpuScene::emulates_floats() const { return state_->exact; }
+
+uint64_t GpuScene::bytes() const {
+  const State& s = *state_;
+  uint64_t bytes = s.rays.bytes() + s.results.bytes();
+  for (const Buffer* buffer : s.scene_buffers()) bytes += buffer->bytes();
+  return bytes;
+}
+
+std::vector<std::string> GpuScene::validation_messages() const { return state_->device->validation_messages(); }
+bool GpuScene::validates() const { return state_->device->validates(); }
+
+} // namespace packtrace::gpu

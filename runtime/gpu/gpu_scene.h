@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/gpu/gpu_config.h"
+#include "runtime/gpu/records/gpu_records.h"
+
+namespace packtrace::gpu {
+
+class Device;
+
+/// A scene's tables as they are uploaded. Needed only while they are.
+struct SceneTables {
+  std::span<const baked::PackedNode> nodes; ///< of all trees
+  std::span<const TreeRecord> trees;
+  std::span<const ClusterRecord> clusters;
+  std::span<const uint8_t> payload; ///< the clusters' bits; 8 more bytes are not read
+  std::span<const packed::TracePlacement> placements;
+  packed::TracePlacement top;                 ///< KernelScene::top
+  std::span<const packed::TopNode> top_nodes; ///< empty for a single placement
+  std::span<const float> exact_vertices;
+  std::span<const uint32_t> masks; ///< empty: no cluster is masked. See gpu_records.h
+  SceneRecord scene;
+  uint32_t tree_levels = 0; ///< of the deepest tree
+};
+
+/// A scene on a device. Hits are those of the CPU's packed kernels, bit for bit, where DeviceTraits::fused_floats or
+/// the exact arithmetic holds. All const functions may be called from several threads; they take turns.
+class GpuScene {
+public:
+  /// Opens a device and uploads the scene. Throws as Device::open() and Buffer do.
+  GpuScene(const GpuConfig& config, const SceneTables& tables);
+  ~GpuScene();
+
+  /// Uploads placements and the tree over them again.
+  void replace_placements(const SceneTables& tables);
+
+  /// Finds nearest hits; see RayTracer::closest_hits().
+  void closest(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<packed::KernelHit> hits) const;
+  /// Finds any hits; see RayTracer::any_hits().
+  void any(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<uint8_t> occluded) const;
+
+  std::string device_name() const;
+  /// Whether float operations are emulated by doubles.
+  bool emulates_floats() const;
+  /// Memory on the device that stays allocated.
+  uint64_t bytes() const;
+  std::vector<std::string> validation_messages() const;
+  bool validates() const;
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+} // namespace packtrace::gpu

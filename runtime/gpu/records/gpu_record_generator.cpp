@@ -1,0 +1,76 @@
+// Writes the GLSL of record_table.h and of the constants that kernels share with the CPU's kernels.
+// Usage: gpu_record_generator OUT.glsl
+
+#include <cstdio>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <limits>
+#include <string>
+
+#include "runtime/gpu/records/record_table.h"
+#include "runtime/trace/packed/kernels/enter.h"
+#include "runtime/trace/packed/kernels/triangle_test.h"
+
+namespace packtrace::gpu {
+namespace {
+
+void write_record(std::ostream& out, const GlslRecord& record) {
+  out << "struct " << record.name << " {\n";
+  for (const GlslField& field : record.fields) {
+    out << "  " << field.type << ' ' << field.name;
+    if (field.count > 1) out << '[' << field.count << ']';
+    out << ";\n";
+  }
+  out << "};\n";
+}
+
+void write(std::ostream& out, const char* name, float value) {
+  out << "const float " << name << " = " << std::setprecision(std::numeric_limits<float>::max_digits10)
+      << std::scientific << value << std::defaultfloat << ";\n";
+}
+
+void write(std::ostream& out, const char* name, uint32_t value) {
+  out << "const uint " << name << " = " << value << "u;\n";
+}
+
+void write_constants(std::ostream& out) {
+  write(out, "kBoxPad", packed::kBoxPad);
+  write(out, "kMinTopPad", packed::kMinTopPad);
+  write(out, "kMinTopDirection", packed::kMinDirectionComponent);
+  write(out, "kFar", static_cast<float>(packed::kFar));
+  write(out, "kUnitRounding", static_cast<float>(packed::kUnitRounding));
+  write(out, "kEdgeError", packed::kEdgeError);
+  write(out, "kSmallestEdge", packed::kSmallestEdge);
+  write(out, "kTopLeaf", packed::kTopLeaf);
+  write(out, "kIndexBitsShift", packed::kIndexBitsShift);
+  write(out, "kInnerChild", uint32_t{baked::kInnerChild});
+  write(out, "kOcclusionClass", uint32_t{baked::kVisibleToOcclusion});
+  write(out, "kMaskedCluster", kMaskedCluster);
+  write(out, "kExactVertices", kExactVertices);
+  write(out, "kGraded", kGraded);
+  write(out, "kInexactDifferences", kInexactDifferences);
+  write(out, "kFineTree", kFineTree);
+}
+
+} // namespace
+} // namespace packtrace::gpu
+
+int main(int argc, char** argv) {
+  using namespace packtrace::gpu;
+  if (argc != 2) {
+    std::cerr << "usage: gpu_record_generator OUT.glsl\n";
+    return 2;
+  }
+  std::ofstream out(argv[1]);
+  out << "// Written by gpu_record_generator from record_table.h.\n";
+  write_constants(out);
+  for (const GlslRecord& record : kRecords) write_record(out, record);
+  out.close();
+  if (!out) {
+    std::remove(argv[1]);
+    std::cerr << argv[1] << ": cannot write\n";
+    return 6;
+  }
+  return 0;
+}

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+
+#include "runtime/trace/packed/kernels/kernel_types.h"
+
+/// Records that the host writes and kernels read. record_table.h describes them, and those of kernel_types.h, once for
+/// both languages.
+namespace packtrace::gpu {
+
+// ClusterRecord::flags
+inline constexpr uint32_t kMaskedCluster = packed::kMasked;
+/// Vertices are read as floats from the buffer of exact vertices, because packed::kNeedsWideDecode is set.
+inline constexpr uint32_t kExactVertices = packed::kNeedsWideDecode;
+
+/// A cluster: packed::TraceCluster with an offset for the pointer.
+struct ClusterRecord {
+  uint32_t word; ///< of the payload, where the cluster's bits begin
+  /// As TraceCluster::base. With kExactVertices base[0] is the number of the cluster's first exact vertex.
+  int32_t base[3];
+  uint32_t position_bit; ///< | width of x << 16 | width of y << 24
+  uint32_t shifts;       ///< width of z | up << 8 | down << 16 | triangle count << 24
+  uint32_t flags;        ///< strip count | TraceCluster::flags << 8
+  uint32_t mask;         ///< with kMaskedCluster: word of the mask buffer with the cluster's MaskedCluster
+};
+
+// TreeRecord::flags
+inline constexpr uint32_t kGraded = 1u << 0;             ///< TraceTree::graded
+inline constexpr uint32_t kInexactDifferences = 1u << 1; ///< coordinates exceed kExactDifferences
+inline constexpr uint32_t kFineTree = 1u << 2;           ///< coordinates exceed kFineGrid
+
+struct TreeRecord {
+  uint32_t first_node;
+  float max_coordinate; ///< TraceTree::max_coordinate
+  uint32_t flags;
+  uint32_t reserved;
+};
+
+/// What all rays of a scene need.
+struct SceneRecord {
+  uint32_t placement_count; ///< the record of the tree over placements follows the last one
+  uint32_t material_word;   ///< word of the mask buffer with the materials of placement 0; see MaskedCluster
+  float top_max_coordinate, top_pad_coordinate;
+};
+
+/// A span of rays to trace.
+struct SpanRecord {
+  uint32_t first, count; ///< rays
+  uint32_t ray_class;
+  uint32_t reserved;
+};
+
+/// In the mask buffer: a cluster whose triangles need a mask lookup. Its texture coordinates follow, two floats a
+/// vertex, if has_uvs is not 0.
+struct MaskedCluster {
+  uint32_t has_uvs;
+  /// Material slot in the placement's materials; for clusters of the world tree, their number from material 0 on.
+  uint32_t slot;
+};
+
+/// In the mask buffer: words of the masks that a material has for all rays and for occlusion rays; 0: none.
+struct MaskMaterial {
+  uint32_t all_rays, shadows;
+};
+
+/// In the mask buffer: an AlphaMask. Its words follow.
+struct MaskImage {
+  uint32_t width, height, wrap, reserved;
+  float scale[2], offset[2];
+};
+
+} // namespace packtrace::gpu

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "runtime/gpu/records/gpu_records.h"
+
+/// The one description of what both C++ and GLSL read. static_asserts compare GLSL's layout (std430) with that of the
+/// C++ records; gpu_record_generator writes the GLSL.
+namespace packtrace::gpu {
+
+struct GlslField {
+  std::string_view type, name;
+  uint32_t offset;    ///< in the C++ record
+  uint32_t count = 1; ///< elements; more than 1: an array
+};
+
+struct GlslRecord {
+  std::string_view name;
+  uint32_t bytes; ///< sizeof the C++ record
+  std::span<const GlslField> fields;
+};
+
+/// Size and alignment of a scalar; arrays of scalars have the same alignment in std430.
+constexpr uint32_t scalar_bytes(std::string_view type) { return type == "double" ? 8 : 4; }
+
+/// Whether GLSL gives the fields of a record the offsets and the size that C++ gives them.
+constexpr bool same_layout(const GlslRecord& record) {
+  uint32_t at = 0, alignment = 4;
+  for (const GlslField& field : record.fields) {
+    const uint32_t bytes = scalar_bytes(field.type);
+    alignment = alignment > bytes ? alignment : bytes;
+    at = (at + bytes - 1) / bytes * bytes;
+    if (at != field.offset) return false;
+    at += bytes * field.count;
+  }
+  return (at + alignment - 1) / alignment * alignment == record.bytes;
+}
+
+inline constexpr std::array kPlacementFields = {
+    GlslField{"double", "grid_from_unit", offsetof(packed::TracePlacement, grid_from_unit), 12},
+    GlslField{"double", "box_lo", offsetof(packed::TracePlacement, box_lo), 3},
+    GlslField{"double", "box_hi", offsetof(packed::TracePlacement, box_hi), 3},
+    GlslField{"uint", "tree", offsetof(packed::TracePlacement, tree)},
+    GlslField{"uint", "classes_aligned", offsetof(packed::TracePlacement, ray_classes)}, // | aligned << 16
+};
+static_assert(offsetof(packed::TracePlacement, aligned) == offsetof(packed::TracePlacement, ray_classes) + 2);
+
+inline constexpr std::array kTopNodeFields = {
+    GlslField{"float", "lo", offsetof(packed::TopNode, lo), 24},
+    GlslField{"float", "hi", offsetof(packed::TopNode, hi), 24},
+    GlslField{"uint", "child", offsetof(packed::TopNode, child), 8},
+    GlslField{"uint", "slots", offsetof(packed::TopNode, slots)},
+    GlslField{"uint", "padding", offsetof(packed::TopNode, slots) + 4, 7},
+};
+
+inline constexpr std::array kRayFields = {
+    GlslField{"float", "origin", offsetof(packed::KernelRay, origin), 3},
+    GlslField{"float", "tnear", offsetof(packed::KernelRay, tnear)},
+    GlslField{"float", "direction", offsetof(packed::KernelRay, direction), 3},
+    GlslField{"float", "tfar", offsetof(packed::KernelRay, tfar)},
+};
+
+inline constexpr std::array kHitFields = {
+    GlslField{"float", "t", offsetof(packed::KernelHit, t)},
+    GlslField{"float", "u", offsetof(packed::KernelHit, u)},
+    GlslField{"float", "v", offsetof(packed::KernelHit, v)},
+    GlslField{"uint", "placement", offsetof(packed::KernelHit, placement)},
+    GlslField{"uint", "cluster", offsetof(packed::KernelHit, cluster)},
+    GlslField{"uint", "triangle", offsetof(packed::KernelHit, triangle)},
+};
+
+inline constexpr std::array kClusterFields = {
+    GlslField{"uint", "word", offsetof(ClusterRecord, word)},
+    GlslField{"int", "base", offsetof(ClusterRecord, base), 3},
+    GlslField{"uint", "position_bit", offsetof(ClusterRecord, position_bit)},
+    GlslField{"uint", "shifts", offsetof(ClusterRecord, shifts)},
+    GlslField{"uint", "flags", offsetof(ClusterRecord, flags)},
+    GlslField{"uint", "mask", offsetof(ClusterRecord, mask)},
+};
+
+inline constexpr std::array kTreeFields = {
+    GlslField{"uint", "first_node", offsetof(TreeRecord, first_node)},
+    GlslField{"float", "max_coordinate", offsetof(TreeRecord, max_coordinate)},
+    GlslField{"uint", "flags", offsetof(TreeRecord, flags)},
+    GlslField{"uint", "reserved", offsetof(TreeRecord, reserved)},
+};
+
+inline constexpr std::array kSceneFields = {
+    GlslField{"uint", "placement_count", offsetof(SceneRecord, placement_count)},
+    GlslField{"uint", "material_word", offsetof(SceneRecord, material_word)},
+    GlslField{"float", "top_max_coordinate", offsetof(SceneRecord, top_max_coordinate)},
+    GlslField{"float", "top_pad_coordinate", offsetof(SceneRecord, top_pad_coordinate)},
+};
+
+inline constexpr std::array kSpanFields = {
+    GlslField{"uint", "first", offsetof(SpanRecord, first)},
+    GlslField{"uint", "count", offsetof(SpanRecord, count)},
+    GlslField{"uint", "ray_class", offsetof(SpanRecord, ray_class)},
+    GlslField{"uint", "reserved", offsetof(SpanRecord, reserved)},
+};
+
+inline constexpr std::array kRecords = {
+    GlslRecord{"PlacementRecord", sizeof(packed::TracePlacement), kPlacementFields},
+    GlslRecord{"TopNode", sizeof(packed::TopNode), kTopNodeFields},
+    GlslRecord{"RayRecord", sizeof(packed::KernelRay), kRayFields},
+    GlslRecord{"HitRecord", sizeof(packed::KernelHit), kHitFields},
+    GlslRecord{"ClusterRecord", sizeof(ClusterRecord), kClusterFields},
+    GlslRecord{"TreeRecord", sizeof(TreeRecord), kTreeFields},
+    GlslRecord{"SceneRecord", sizeof(SceneRecord), kSceneFields},
+    GlslRecord{"SpanRecord", sizeof(SpanRecord), kSpanFields},
+};
+
+constexpr bool same_layouts() {
+  for (const GlslRecord& record : kRecords)
+    if (!same_layout(record)) return false;
+  return true;
+}
+static_assert(same_layouts(), "GLSL would lay out a record differently from C++");
+
+// Kernels read nodes as vectors of four words, and the records of the mask buffer as words.
+static_assert(sizeof(baked::PackedNode) == 80 && offsetof(baked::PackedNode, exponents) == 12 &&
+              offsetof(baked::PackedNode, ray_classes) == 14 && offsetof(baked::PackedNode, first_triangle) == 15 &&
+              offsetof(baked::PackedNode, first_child) == 16 && offsetof(baked::PackedNode, cluster) == 20 &&
+              offsetof(baked::PackedNode, children) == 24 && offsetof(baked::PackedNode, lo) == 32 &&
+              offsetof(baked::PackedNode, hi) == 56);
+static_assert(sizeof(MaskedCluster) == 8 && sizeof(MaskMaterial) == 8 && sizeof(MaskImage) == 32);
+
+} // namespace packtrace::gpu

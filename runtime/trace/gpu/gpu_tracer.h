@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+
+#include "runtime/gpu/gpu_config.h"
+#include "runtime/trace/gpu/gpu_tables.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/trace/ray_tracer.h"
+
+namespace packtrace {
+
+/// Traces the packed clusters of a baked file on a GPU; its hits are PackedTracer's, bit for bit (docs/gpu.md). The
+/// packed tracer beside it chooses the trees, places instances and resolves hits.
+class GpuTracer final : public RayTracer {
+public:
+  /// Keeps references, as PackedTracer does. Throws as PackedTracer and gpu::GpuScene do, and Error(kUnsupported) for
+  /// geometry that deforms.
+  GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers = {});
+  /// Does the same at the detail of a plan, whose trees are made on the CPU.
+  GpuTracer(const BakedFile& file, const LodSource& source, const GpuConfig& config, const Movers& movers = {});
+
+  std::string_view name() const override { return "gpu"; }
+  std::string_view isa() const override { return device_; }
+  const UnitSpace& space() const override { return packed_.space(); }
+  uint32_t preferred_rays_per_call() const override { return 1u << 16; }
+  void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                    std::span<RayHit> hits) const override;
+  void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                std::span<uint8_t> occluded) const override;
+  HitSurface resolve(const RayHit& hit) const override { return packed_.resolve(hit); }
+  void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) override;
+  std::span<const Affine> world_from_object() const override { return packed_.world_from_object(); }
+  std::array<DVec3, 3> object_vertices(const RayHit& hit, const HitSurface& surface) const override {
+    return packed_.object_vertices(hit, surface);
+  }
+  std::vector<ResidentPart> resident() const override;
+  std::span<const uint32_t> flat_instances() const override { return packed_.flat_instances(); }
+  std::vector<TreeBytes> tree_bytes() const override { return packed_.tree_bytes(); }
+
+  const gpu::GpuScene& scene() const { return *scene_; }
+  const PackedTracer& packed() const { return packed_; }
+
+private:
+  void upload(const GpuConfig& config);
+
+  PackedTracer packed_;
+  GpuTables tables_;
+  std::unique_ptr<gpu::GpuScene> scene_;
+  std::string device_; ///< its name, and how it makes floats
+};
+
+} // namespace packtrace
