@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "compress/bake/level_chain.h"
+#include "compress/bake/proxies/proxy_config.h"
 #include "compress/format/cluster/normal_codec.h"
 #include "compress/format/cluster/uv_codec.h"
 #include "compress/format/layout/baked_format.h"
@@ -96,6 +97,8 @@ struct BakeConfig {
   PageCodec codec = PageCodec::kNone;
 
   bool trees = true; ///< store trees over the clusters; otherwise they are built before tracing
+
+  ProxyConfig proxy; ///< stand-ins for far or small instances
 
   LodUse lod = LodUse::kOff;
   uint32_t lod_min_triangles = 128; ///< geometries with fewer triangles get no LOD levels

@@ -18,6 +18,7 @@
 #include "compress/bake/lod/shared_borders.h"
 #include "compress/bake/plan/geometry_plan.h"
 #include "compress/bake/plan/material_runs.h"
+#include "compress/bake/proxies/build_proxies.h"
 #include "compress/bake/sequence/sequence_baker.h"
 #include "compress/bake/write/file_sections.h"
 #include "compress/bake/write/lod_store.h"
@@ -48,6 +49,7 @@ public:
     pack();
     BakedScene result;
     result.bytes = assemble();
+    if (config_.proxy.use != ProxyUse::kOff) add_proxies(result.bytes);
     if (config_.codec != PageCodec::kNone) {
       progress_.begin("coding pages", 0);
       result.bytes = encode_paged_file(BakedFile::borrow_bytes(result.bytes, "bake result"), config_.codec);
@@ -92,6 +94,14 @@ private:
     report_.resumed_geometries = packer_->resumed();
     add_up(scene_, plan_, packed_, report_, diagnostics_);
     return sections.assemble(summary(sections));
+  }
+
+  /// Builds proxies from the geometries as they are packed.
+  void add_proxies(std::vector<std::byte>& bytes) {
+    const BakedFile file = BakedFile::borrow_bytes(bytes, "bake result");
+    const std::vector<Proxy> proxies = build_proxies(file, config_.proxy, config_.memory, progress_,
+                                                     [this](std::string message) { warn(std::move(message)); });
+    if (!proxies.empty()) bytes = with_proxies(file, proxies);
   }
 
   /// Packs the motion of instances and cameras. Bounds of the file are those of what the packed motion does.

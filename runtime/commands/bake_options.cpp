@@ -224,6 +224,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
   add_motion_options(verb, options);
   add_distance_level_option(verb, options);
   add_sequence_options(verb, options);
+  add_proxy_options(verb, options.proxy);
   add_choice_options(verb, options);
   verb.add_flag("--dry-run", options.dry_run, "Import and bake without writing a file, to see sizes and errors");
   add_scene_options(verb, options.scene);
@@ -261,6 +262,7 @@ void apply_preset(BakeOptions& options) {
 
 BakeConfig make_config(const BakeOptions& options) {
   BakeConfig config = options.config;
+  config.proxy = make_proxy_config(options.proxy);
   config.normals = find_normal_encoding(options.normals.value_or(kAuto));
   if (config.normals && options.normal_error)
     throw Error(ErrorKind::kUsage,

@@ -9,6 +9,7 @@
 
 #include "compress/bake/bake_config.h"
 #include "runtime/commands/loaded_scene.h"
+#include "runtime/commands/proxy_options.h"
 
 namespace packtrace {
 
@@ -38,6 +39,7 @@ struct BakeOptions {
   std::optional<double> sequence_fps;
   std::optional<int64_t> sequence_start;
   std::optional<uint32_t> sequence_group;
+  ProxyOptions proxy;
   SceneOptions scene;
   bool dry_run = false;
   std::string preset;                ///< empty, or one of kPresets

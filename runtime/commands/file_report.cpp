@@ -1,4 +1,5 @@
 #include "runtime/commands/file_report.h"
+#include "runtime/commands/proxy_report.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +16,7 @@ namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 23> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 24> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -37,6 +38,7 @@ std::array<Row, 23> stream_rows(const StreamBytes& bytes) {
            {"shading_materials", bytes.shading_materials},
            {"lights", bytes.lights},
            {"environment_maps", bytes.environment_maps},
+           {"proxies", bytes.proxies},
            {"header_and_alignment", bytes.header_and_alignment},
            {"total", bytes.total}}};
 }
@@ -187,6 +189,7 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"normals", normals_json(s)},
       {"uvs", uvs_json(s)},
       {"textures", textures_json(s)},
+      {"proxies", proxies_json(s)},
       {"max_position_error", s.max_position_error},
       {"max_position_error_bound", s.max_position_error_bound},
       {"max_normal_error_degrees", s.max_normal_error_degrees},
@@ -322,7 +325,7 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
     text +=
         fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, placed", s.bytes.total, s.bytes_per_placed_triangle);
   text += sequences_text(s);
-  return text + "\n" + lod_text(s, by_geometry) + requirements_text(s, by_geometry);
+  return text + "\n" + proxies_text(s, by_geometry) + lod_text(s, by_geometry) + requirements_text(s, by_geometry);
 }
 
 } // namespace packtrace

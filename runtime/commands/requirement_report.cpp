@@ -9,6 +9,7 @@
 
 #include "pbrt_import/scene/material_flag_names.h"
 #include "runtime/commands/file_report.h"
+#include "runtime/commands/proxy_report.h"
 
 namespace packtrace {
 namespace {
@@ -128,6 +129,7 @@ std::string requirements_text(const FileSummary& s, bool by_geometry) {
   const uint32_t purpose = purpose_of(s);
   std::string text = fmt::format("required for {}:\n", kPurposeNames[purpose]);
   for (const baked::RequirementRecord& row : s.requirements) text += "  " + sentence(row, purpose) + "\n";
+  if (const std::string proxies = proxies_requirement(s); !proxies.empty()) text += "  " + proxies + "\n";
   text += "  " + materials_sentence(s) + "\n";
   if (!by_geometry) return text;
   text += "by geometry:\n";

@@ -265,7 +265,7 @@ TEST(FileSummary, StreamsAddUpToTheFile) {
   const StreamBytes& b = s.bytes;
   EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
                 b.instance_records + b.material_records + b.masks + b.textures + b.cameras + b.strings +
-                b.requirement_records + b.trees + b.shading_materials + b.lights + b.environment_maps +
+                b.requirement_records + b.trees + b.shading_materials + b.lights + b.environment_maps + b.proxies +
                 b.header_and_alignment,
             b.total);
   EXPECT_GT(b.uvs, 0u);

@@ -12,6 +12,7 @@
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/file_summary.h"
 #include "compress/format/motion/motion_stream.h"
+#include "compress/format/voxels/proxy_section.h"
 #include "pbrt_import/scene/motion_pose.h"
 #include "tests/fuzz/baked_input.h"
 
@@ -183,12 +184,30 @@ void read_rest(const BakedFile& file) {
   require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");
 }
 
+/// Reads voxels all over each grid.
+void read_proxies_of(const BakedFile& file) {
+  const std::span<const uint8_t> bytes = proxy_bytes(file);
+  if (bytes.empty()) return;
+  for (const Proxy& proxy : read_proxies(bytes)) {
+    require(proxy.record.geometry < file.geometries().size(), "geometry of a proxy");
+    const VoxelIndex size = proxy.voxels.size();
+    constexpr uint32_t kSteps = 12;
+    for (uint32_t i = 0; i < kSteps * kSteps * kSteps; ++i) {
+      const auto at = [&](uint32_t step, uint32_t count) { return step * (count - 1) / (kSteps - 1); };
+      const VoxelIndex v = {at(i % kSteps, size[0]), at(i / kSteps % kSteps, size[1]),
+                            at(i / kSteps / kSteps, size[2])};
+      if (proxy.voxels.test(v)) require(proxy.voxels.swatch(v) <= proxy.palette.size(), "swatch");
+    }
+  }
+}
+
 void read_baked(std::span<const std::byte> bytes) {
   expect_read_or_refused([&] {
     const BakedFile file = BakedFile::from_bytes(bytes);
     for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
     for (uint32_t g = 0; g < file.base_geometry_count(); ++g) read_lod(file, g);
     read_trees(file);
+    read_proxies_of(file);
     read_rest(file);
   });
 }

@@ -68,6 +68,7 @@ public:
     BakeConfig config = config_;
     config.trees = false;
     write(config, "treeless");
+    write_proxies();
     write_sequence();
     if (!scene_.textures.empty()) write_texture_codecs();
     if (has_normals()) write_normal_encodings();
@@ -78,6 +79,18 @@ private:
     Diagnostics diagnostics;
     Progress progress;
     write_file_bytes(stem_.string() + "." + ending, bake_to_bytes(scene_, config, diagnostics, progress).bytes);
+  }
+
+  void write_proxies() const {
+    BakeConfig config = config_;
+    config.proxy.use = ProxyUse::kVoxels;
+    config.proxy.voxels = 6;
+    config.proxy.materials = true;
+    write(config, "voxels");
+    config.proxy.voxels = 20;
+    config.proxy.materials = false, config.proxy.dag = true, config.proxy.fill = true;
+    config.codec = PageCodec::kSmall;
+    write(config, "dag");
   }
 
   /// Moves the first mesh of the scene.

@@ -14,6 +14,8 @@
 #include "compress/format/motion/deformation_validation.h"
 #include "compress/format/motion/rigid_motion_validation.h"
 #include "compress/format/trees/tree_validation.h"
+#include "compress/format/voxels/proxy_codec.h"
+#include "compress/format/voxels/proxy_section.h"
 #include "pbrt_import/base/file_error.h"
 
 namespace packtrace {
@@ -31,6 +33,7 @@ public:
     check_header();
     check_section_table();
     if (!zero_between_sections()) fail("nonzero bytes between sections");
+    check_proxies();
     check_shading();
     check_materials_and_masks();
     check_textures();
@@ -174,6 +177,14 @@ private:
       for (const float f : {m.uv_scale[0], m.uv_scale[1], m.uv_offset[0], m.uv_offset[1]})
         if (!std::isfinite(f)) fail("mask", i, "texture transform");
     }
+  }
+
+  /// Splits the proxies from the texture bytes.
+  void check_proxies() {
+    if ((sections_.summary.front().purpose & voxels::kHasProxies) == 0) return;
+    const std::optional<std::span<const uint8_t>> proxies = split_proxies(sections_.texture_bytes);
+    if (!proxies) fail("proxies", 0, "extent");
+    if (const auto fault = find_proxy_fault(*proxies, sections_.geometries.size())) fail("proxies", 0, *fault);
   }
 
   /// Splits the shading from the texture bytes.
@@ -373,7 +384,7 @@ private:
       if (r.stream < before.stream || (r.stream == before.stream && r.reason <= before.reason))
         fail("requirement", i, "order");
     }
-    const uint32_t purpose = sections_.summary.front().purpose;
+    const uint32_t purpose = sections_.summary.front().purpose & ~voxels::kHasProxies;
     if ((purpose & ((1u << baked::kKeepShift) - 1)) >= baked::kPurposeCount ||
         purpose >> baked::kKeepShift >> baked::kStreamCount != 0)
       fail("purpose");

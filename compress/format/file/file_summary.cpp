@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "compress/format/deformation/deformation_view.h"
+#include "compress/format/voxels/proxy_section.h"
 
 namespace packtrace {
 namespace {
@@ -35,10 +36,11 @@ StreamBytes stream_bytes(const BakedFile& file) {
   }
   bytes.strings = s.strings.size();
   bytes.total = file.file_bytes();
+  if (const size_t proxies = proxy_bytes(file).size(); proxies > 0) bytes.proxies = proxies + sizeof(uint64_t);
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
                                bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records -
-                               bytes.trees - bytes.rigid_motion - bytes.deformation - s.shading.size();
+                               bytes.trees - bytes.rigid_motion - bytes.deformation - s.shading.size() - bytes.proxies;
   return bytes;
 }
 
@@ -148,6 +150,19 @@ void add_materials(FileSummary& summary, const BakedSections& s) {
   for (const baked::GeometryRecord& g : s.geometries) summary.max_slots = std::max(summary.max_slots, g.slot_count);
 }
 
+std::vector<ProxySummary> summarize_proxies(const BakedFile& file) {
+  std::vector<ProxySummary> result;
+  const std::span<const uint8_t> bytes = proxy_bytes(file);
+  if (bytes.empty()) return result;
+  for (const Proxy& proxy : read_proxies(bytes)) {
+    const voxels::ProxyRecord& r = proxy.record;
+    result.push_back({std::string(file.text(file.geometries()[r.geometry].name)), r.kind, r.flags, r.palette_count,
+                      proxy.voxels.size(), r.edge, r.surface_error, r.voxel_error, proxy.voxels.stored_voxels(),
+                      proxy.voxels.bits(), proxy.voxels.index_bits()});
+  }
+  return result;
+}
+
 } // namespace
 
 FileSummary summarize(const BakedFile& file) {
@@ -201,6 +216,7 @@ FileSummary summarize(const BakedFile& file) {
     }
   }
   summary.lod = summarize_lod(file);
+  summary.proxies = summarize_proxies(file);
   summary.motion = summarize_motion(file);
   summary.instances = s.instances.size();
   summary.materials = s.materials.size();

@@ -7,6 +7,7 @@
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_summary.h"
 #include "compress/format/motion/motion_summary.h"
+#include "compress/format/voxels/proxy_codec.h"
 
 namespace packtrace {
 
@@ -21,8 +22,9 @@ struct StreamBytes {
   uint64_t trees = 0; ///< tree records and nodes
   uint64_t rigid_motion = 0, deformation = 0;
   uint64_t shading_materials = 0, lights = 0, environment_maps = 0; ///< only in files baked for shading
-  uint64_t header_and_alignment = 0;                                ///< includes the summary record
-  uint64_t total = 0;                                               ///< of the file
+  uint64_t proxies = 0;
+  uint64_t header_and_alignment = 0; ///< includes the summary record
+  uint64_t total = 0;                ///< of the file
 };
 
 /// A position grid and the number of geometries that use it.
@@ -91,6 +93,15 @@ struct LevelChainUse {
 
 /// Report of `info` about a baked file. Counts of geometries, triangles and so on are those of level 0; bytes include
 /// all levels.
+/// A proxy, see proxy_format.h.
+struct ProxySummary {
+  std::string name; ///< of the geometry
+  uint32_t kind = 0, flags = 0, swatches = 0;
+  VoxelIndex size{};
+  double edge = 0.0, surface_error = 0.0, voxel_error = 0.0;
+  uint64_t stored_voxels = 0, bits = 0, index_bits = 0; ///< without the header
+};
+
 struct FileSummary {
   uint64_t triangles = 0, placed_triangles = 0, vertices = 0, placed_vertices = 0, clusters = 0;
   uint64_t lights = 0, area_light_materials = 0; ///< only in files baked for shading
@@ -106,6 +117,7 @@ struct FileSummary {
   std::vector<UvUse> uvs; ///< ordered by encoding
   std::vector<SequenceUse> sequences;
   std::vector<LevelChainUse> level_chains;
+  std::vector<ProxySummary> proxies;
   LodSummary lod;
   MotionSummary motion;
   uint64_t trees = 0, nodes = 0;   ///< of all levels

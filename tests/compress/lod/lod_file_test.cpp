@@ -311,7 +311,7 @@ TEST(LodFile, SummaryCountsLevelsAndTheirBytes) {
   EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
                 b.instance_records + b.material_records + b.masks + b.textures + b.cameras + b.strings +
                 b.requirement_records + b.lod_records + b.trees + b.shading_materials + b.lights + b.environment_maps +
-                b.header_and_alignment,
+                b.proxies + b.header_and_alignment,
             b.total);
 }
 

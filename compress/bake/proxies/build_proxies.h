@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "compress/bake/proxies/proxy_config.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/voxels/proxy_codec.h"
+#include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/base/progress.h"
+
+namespace packtrace {
+
+/// Builds the proxies of a file's instanced geometries, or of all geometries if none is instanced. Geometries in which
+/// nothing occludes, and those that deform, get none.
+/// @param warn is called with what was asked for and could not be done
+/// Throws like voxelize() and encode_occupancy(), and Error(kLimitExceeded) for more than 256 materials of a geometry.
+std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& config, const MemoryBudget& budget,
+                                 Progress& progress, const std::function<void(std::string)>& warn);
+
+/// The file with these proxies.
+/// @param file without proxies
+std::vector<std::byte> with_proxies(const BakedFile& file, std::span<const Proxy> proxies);
+
+} // namespace packtrace

@@ -1,0 +1,205 @@
+#include "compress/bake/proxies/geometry_voxels.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "compress/bake/lod/bound/triangle_distance.h"
+#include "pbrt_import/base/error.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kFineBits = 24; // of a lattice that is divided exactly
+
+/// The grid of voxels over a lattice, in fine units: N to a rounded step.
+struct FineGrid {
+  uint32_t shift = 0; // of lattice coordinates
+  int64_t scale = 1;  // N
+  int64_t edge = 1;   // of a voxel, fine units
+  VoxelIndex size{};
+
+  FineGrid(const LatticePoint& extent, uint32_t voxels) : scale(voxels) {
+    const int64_t longest = *std::max_element(extent.begin(), extent.end());
+    const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(longest)));
+    shift = bits > kFineBits ? bits - kFineBits : 0;
+    edge = std::max<int64_t>(rounded(longest), 1);
+    for (size_t a = 0; a < 3; ++a)
+      size[a] = static_cast<uint32_t>(std::clamp<int64_t>((rounded(extent[a]) * scale + edge - 1) / edge, 1, scale));
+  }
+
+  int64_t rounded(int64_t p) const { return shift == 0 ? p : (p + (int64_t{1} << (shift - 1))) >> shift; }
+  FineTriangle triangle(const OccludingTriangle& t) const {
+    FineTriangle fine;
+    for (size_t i = 0; i < 3; ++i)
+      for (size_t a = 0; a < 3; ++a) fine[i][a] = rounded(t.corners[i][a]) * scale;
+    return fine;
+  }
+  /// Of a voxel, in steps of the lattice.
+  double edge_steps() const {
+    return static_cast<double>(edge) / static_cast<double>(scale) * std::ldexp(1.0, static_cast<int>(shift));
+  }
+};
+
+DVec3 vec(const LatticePoint& p) {
+  return DVec3(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+}
+
+/// Numbers the voxels of a set in its order.
+class VoxelNumbers {
+public:
+  explicit VoxelNumbers(const VoxelSet& set) : set_(set) {
+    const VoxelIndex size = set.size();
+    rows_.reserve(size_t{size[1]} * size[2]);
+    for (uint32_t z = 0; z < size[2]; ++z)
+      for (uint32_t y = 0; y < size[1]; ++y) {
+        rows_.push_back(count_);
+        for (uint32_t w = 0; w < set.row_words(); ++w) count_ += static_cast<uint64_t>(std::popcount(set.row(y, z)[w]));
+      }
+  }
+  size_t operator[](VoxelIndex v) const {
+    const uint64_t* const row = set_.row(v[1], v[2]);
+    uint64_t number = rows_[size_t{v[2]} * set_.size()[1] + v[1]];
+    for (uint32_t w = 0; w < v[0] / 64; ++w) number += static_cast<uint64_t>(std::popcount(row[w]));
+    return static_cast<size_t>(
+        number + static_cast<uint64_t>(std::popcount(row[v[0] / 64] & ((uint64_t{1} << (v[0] % 64)) - 1))));
+  }
+  uint64_t count() const { return count_; }
+
+private:
+  const VoxelSet& set_;
+  std::vector<uint64_t> rows_;
+  uint64_t count_ = 0;
+};
+
+/// Bytes of voxelize() and of the encoding for a grid; measured on large meshes and rounded up.
+uint64_t working_bytes(const FineGrid& grid) { return 4 * VoxelSet::bytes_for(grid.size) + (uint64_t{1} << 20); }
+
+MemoryReservation reserve(const LatticePoint& extent, uint32_t voxels, const MemoryBudget& budget,
+                          const std::string& what) {
+  const FineGrid grid(extent, voxels);
+  if (working_bytes(grid) > budget.left()) {
+    uint32_t fits = voxels;
+    while (fits > 1 && working_bytes(FineGrid(extent, fits)) > budget.left()) --fits;
+    throw MemoryError("voxels of " + what + ": a grid of " + std::to_string(grid.size[0]) + " x " +
+                      std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) + " needs " +
+                      std::to_string(working_bytes(grid) >> 20) + " MiB of memory, of " +
+                      std::to_string(budget.left() >> 20) + " MiB left; the largest that fits is --proxy-voxels " +
+                      std::to_string(fits));
+  }
+  return MemoryReservation(budget, working_bytes(grid), "voxels of " + what);
+}
+
+class Voxelizer {
+public:
+  Voxelizer(const BakedFile& file, std::span<const uint32_t> runs, const OccludingTriangles& source,
+            const ProxyConfig& config)
+      : file_(file), runs_(runs), source_(source), config_(config), grid_(source.extent, config.voxels) {}
+
+  GeometryVoxels run() {
+    result_.set = VoxelSet(grid_.size);
+    result_.frame = {vec(source_.low) * source_.step, grid_.edge_steps() * source_.step, grid_.size};
+    for_each_pair([&](const OccludingTriangle&, VoxelIndex v) { result_.set.set(v); });
+    const VoxelSet surface = result_.set;
+    if (config_.fill && source_.closed) fill();
+    measure_voxels();
+    measure_surface(surface);
+    return std::move(result_);
+  }
+
+private:
+  /// Visits each triangle with each voxel that it sets: visit(triangle, voxel).
+  template <class Visit>
+  void for_each_pair(const Visit& visit) const {
+    const double edge = grid_.edge_steps();
+    for (const OccludingTriangle& t : source_.triangles)
+      TriangleVoxels(grid_.triangle(t), grid_.edge, grid_.size, config_.rule)
+          .for_each_row([&](uint32_t y, uint32_t z, uint32_t first, uint32_t last) {
+            for (uint32_t x = first; x <= last; ++x)
+              if (!t.masked || opaque_within(file_, runs_, t, edge * DVec3(x, y, z), edge))
+                visit(t, VoxelIndex{x, y, z});
+          });
+  }
+
+  void fill() {
+    VoxelSet inside(grid_.size);
+    for (const OccludingTriangle& t : source_.triangles) add_crossings(grid_.triangle(t), grid_.edge, inside);
+    prefix_parity(inside);
+    result_.set.merge(inside);
+    result_.filled = true;
+  }
+
+  void measure_voxels() {
+    constexpr float kNone = std::numeric_limits<float>::infinity();
+    const double edge = grid_.edge_steps();
+    const VoxelNumbers numbers(result_.set);
+    std::vector<float> distances(static_cast<size_t>(numbers.count()), kNone); // inside: nothing sets them
+    if (config_.materials) result_.slots.resize(distances.size());
+    for_each_pair([&](const OccludingTriangle& t, VoxelIndex v) {
+      const DVec3 center = edge * (DVec3(v[0], v[1], v[2]) + 0.5);
+      const DVec3 nearest = nearest_point(center, vec(t.corners[0]), vec(t.corners[1]), vec(t.corners[2]));
+      const auto distance = static_cast<float>(glm::distance(center, nearest));
+      const size_t number = numbers[v];
+      if (!(distance < distances[number])) return;
+      distances[number] = distance;
+      if (config_.materials) result_.slots[number] = t.slot;
+    });
+    for (const float d : distances)
+      if (d != kNone) result_.voxel_error = std::max(result_.voxel_error, double{d});
+    result_.voxel_error *= source_.step;
+  }
+
+  void measure_surface(const VoxelSet& surface) {
+    double largest = 0.0; // squared, in voxels
+    const double per_voxel = 1.0 / grid_.edge_steps();
+    for (const OccludingTriangle& t : source_.triangles) {
+      if (t.masked) continue; // where it is absent, no voxel is near
+      const DVec3 a = vec(t.corners[0]) * per_voxel, ab = vec(t.corners[1]) * per_voxel - a,
+                  ac = vec(t.corners[2]) * per_voxel - a;
+      const double longest = std::max({glm::length(ab), glm::length(ac), glm::length(ab - ac)});
+      const int steps = std::max(1, static_cast<int>(std::ceil(2.0 * longest)));
+      for (int u = 0; u <= steps; ++u)
+        for (int v = 0; u + v <= steps; ++v)
+          largest = std::max(largest, nearest_squared(surface, a + (ab * double(u) + ac * double(v)) / double(steps)));
+    }
+    result_.surface_error = std::sqrt(largest) * result_.frame.edge;
+  }
+
+  /// Squared distance to the centre of the voxel of a point, or else of the nearest one around; in voxels.
+  static double nearest_squared(const VoxelSet& set, DVec3 p) {
+    const glm::dvec3 top(set.size()[0] - 1.0, set.size()[1] - 1.0, set.size()[2] - 1.0);
+    const DVec3 own = glm::clamp(glm::floor(p), DVec3(0.0), top);
+    const auto squared = [&](DVec3 v) { return glm::dot(v + 0.5 - p, v + 0.5 - p); };
+    const auto x = static_cast<int64_t>(own.x), y = static_cast<int64_t>(own.y), z = static_cast<int64_t>(own.z);
+    if (set.contains(x, y, z)) return squared(own);
+    for (int64_t reach = 1;; ++reach) {
+      double best = std::numeric_limits<double>::infinity();
+      for (int64_t k = -reach; k <= reach; ++k)
+        for (int64_t j = -reach; j <= reach; ++j)
+          for (int64_t i = -reach; i <= reach; ++i)
+            if (set.contains(x + i, y + j, z + k)) best = std::min(best, squared(own + DVec3(i, j, k)));
+      if (best < std::numeric_limits<double>::infinity() || reach > 8) return best;
+    }
+  }
+
+  const BakedFile& file_;
+  std::span<const uint32_t> runs_;
+  const OccludingTriangles& source_;
+  const ProxyConfig& config_;
+  FineGrid grid_;
+  GeometryVoxels result_;
+};
+
+} // namespace
+
+GeometryVoxels voxelize(const BakedFile& file, std::span<const uint32_t> runs, const OccludingTriangles& source,
+                        const ProxyConfig& config, const MemoryBudget& budget, const std::string& what) {
+  if (config.voxels < 1 || config.voxels > kMaxGridSize)
+    throw Error(ErrorKind::kUsage,
+                "voxels: a grid has 1 to " + std::to_string(kMaxGridSize) + " voxels along its longest side");
+  const MemoryReservation memory = reserve(source.extent, config.voxels, budget, what);
+  return Voxelizer(file, runs, source, config).run();
+}
+
+} // namespace packtrace

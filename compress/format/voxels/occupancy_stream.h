@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "compress/format/voxels/occupancy_format.h"
+#include "compress/format/voxels/voxel_set.h"
+
+namespace packtrace {
+
+/// Voxels as a tree of bits without pointers that any voxel can be read from: occupancy_format.h describes the words.
+class OccupancyStream {
+public:
+  /// Where a level's parts start, in words.
+  struct LevelPlace {
+    uint64_t masks = 0, groups = 0, blocks = 0, full = 0, pointers = 0;
+  };
+
+  OccupancyStream() = default;
+  /// The words must match the header; find_occupancy_fault() checks those of unknown origin.
+  OccupancyStream(const voxels::OccupancyHeader& header, std::vector<uint32_t> words);
+
+  const voxels::OccupancyHeader& header() const { return header_; }
+  std::span<const uint32_t> words() const { return words_; }
+  const LevelPlace& place(uint32_t level) const { return places_[level]; }
+  uint64_t swatch_place() const { return swatches_; }
+  uint32_t levels() const { return header_.levels; }
+  const VoxelIndex& size() const { return header_.size; }
+
+  /// Bits of the words, and those of them that only make access fast (ranks).
+  uint64_t bits() const { return words_.size() * uint64_t{32}; }
+  uint64_t index_bits() const;
+  /// Voxels whose bits the last level stores; voxels of full cells are not among them.
+  uint64_t stored_voxels() const { return header_.level[header_.levels - 1].set_bits; }
+
+  /// Whether a voxel of the grid is set. Takes O(levels).
+  bool test(VoxelIndex voxel) const;
+  /// Palette index of a set voxel of the last level; 0 without swatches or for voxels of full cells.
+  uint32_t swatch(VoxelIndex voxel) const;
+
+  /// What a mask bit says.
+  enum class Cell : uint32_t { kEmpty, kFull, kNode };
+  /// @param level 0..levels() - 2
+  Cell cell(uint32_t level, uint64_t bit) const {
+    if (mask_bit(level, bit)) return Cell::kNode;
+    if ((header_.flags & voxels::kHasFull) == 0) return Cell::kEmpty;
+    return read_bit(places_[level].full, bit - rank(level, bit)) ? Cell::kFull : Cell::kEmpty;
+  }
+  /// Node of the next level that belongs to a set bit.
+  uint64_t node(uint32_t level, uint64_t bit) const {
+    const uint64_t edge = rank(level, bit);
+    const uint32_t width = header_.level[level + 1].pointer_bits;
+    return width == 0 ? edge : read_field(places_[level + 1].pointers, edge * width, width);
+  }
+  bool mask_bit(uint32_t level, uint64_t bit) const { return read_bit(places_[level].masks, bit); }
+  /// The 8 bits of a node.
+  uint32_t mask(uint32_t level, uint64_t node) const {
+    return words_[places_[level].masks + node / 4] >> (8 * (node % 4)) & 0xffu;
+  }
+  /// Set bits of a level's masks before `bit`. Reads at most 16 words and two ranks. Not for a last level without
+  /// swatches.
+  uint64_t rank(uint32_t level, uint64_t bit) const {
+    const LevelPlace& place = places_[level];
+    const uint64_t block = bit / voxels::kRankBits, group = block / voxels::kRankGroupBlocks;
+    uint64_t rank = group == 0 ? 0 : words_[place.groups + group - 1];
+    if (block > 0) rank += words_[place.blocks + (block - 1) / 2] >> (16 * ((block - 1) % 2)) & 0xffffu;
+    uint64_t word = place.masks + block * (voxels::kRankBits / 32);
+    for (const uint64_t last = place.masks + bit / 32; word < last; ++word)
+      rank += static_cast<uint64_t>(std::popcount(words_[word]));
+    return rank + static_cast<uint64_t>(std::popcount(words_[word] & ((1u << (bit % 32)) - 1)));
+  }
+  uint32_t read_field(uint64_t word, uint64_t bit, uint32_t width) const {
+    word += bit / 32;
+    const uint32_t shift = bit % 32;
+    uint64_t value = words_[word];
+    if (shift + width > 32) value |= uint64_t{words_[word + 1]} << 32;
+    return static_cast<uint32_t>(value >> shift & ((uint64_t{1} << width) - 1));
+  }
+
+private:
+  bool read_bit(uint64_t word, uint64_t bit) const { return (words_[word + bit / 32] >> (bit % 32) & 1) != 0; }
+  /// Bit of the last level that holds a voxel; none if a level above decides, then `full` says how.
+  std::optional<uint64_t> leaf_bit(VoxelIndex voxel, bool& full) const;
+
+  voxels::OccupancyHeader header_{};
+  std::vector<uint32_t> words_;
+  std::array<LevelPlace, voxels::kMaxLevels> places_{};
+  uint64_t swatches_ = 0;
+};
+
+/// Options of encode_occupancy().
+struct OccupancyOptions {
+  uint32_t levels = 0;      ///< kMinLevels..kMaxLevels; 0: those that take the fewest bits
+  bool dag = false;         ///< store equal subtrees once where that takes fewer bits; not with swatches
+  std::optional<bool> full; ///< bits for full cells; unset: if that takes fewer bits
+  /// Palette index of each set voxel, in the order of VoxelSet::for_each(); empty: no swatches. Only voxels with an
+  /// empty neighbour or at the border keep theirs.
+  std::span<const uint8_t> swatches;
+  uint32_t palette_count = 0;
+};
+
+/// Encodes a set of at least one voxel. Throws Error(kUsage) for options out of range, Error(kLimitExceeded) if a level
+/// has more than 2^32 bits.
+OccupancyStream encode_occupancy(const VoxelSet& set, const OccupancyOptions& options);
+
+/// All voxels of a stream.
+VoxelSet decode_occupancy(const OccupancyStream& stream);
+
+/// Why header or words are damaged; nothing if OccupancyStream may read them. Allocates nothing.
+std::optional<std::string_view> find_occupancy_fault(const voxels::OccupancyHeader& header,
+                                                     std::span<const uint32_t> words);
+
+} // namespace packtrace

@@ -1,0 +1,63 @@
+#include "runtime/commands/proxy_options.h"
+
+#include "compress/format/voxels/voxel_set.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/commands/option_checks.h"
+
+namespace packtrace {
+namespace {
+
+constexpr const char *kNoProxy = "off", *kVoxelsName = "voxels";
+constexpr const char *kConservativeName = "conservative", *kThinName = "thin";
+
+} // namespace
+
+void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
+  constexpr const char* kGroup = "Proxies";
+  verb.add_option(
+          "--proxy", options.proxy,
+          "Store a stand-in for each instanced geometry, or for each geometry if none is instanced. voxels: one "
+          "bit where the surface passes, in a tree that any voxel can be read from (default off)")
+      ->check(one_of({kNoProxy, kVoxelsName}))
+      ->default_str(kNoProxy)
+      ->group(kGroup);
+  verb.add_option("--proxy-voxels", options.voxels,
+                  "Voxels along the longest side of a geometry's bounds, 1..4096 (default 64)")
+      ->type_name("N")
+      ->group(kGroup);
+  verb.add_option("--proxy-surface", options.rule,
+                  "Which voxels are set. conservative: all that the surface touches; thin: fewer, without holes that a "
+                  "path through faces could pass (default conservative)")
+      ->check(one_of({kConservativeName, kThinName}))
+      ->group(kGroup);
+  verb.add_flag("--proxy-fill", options.fill,
+                "Also set the voxels inside closed geometries, which takes fewer bits; open ones are reported")
+      ->group(kGroup);
+  verb.add_flag("--proxy-dag", options.dag, "Store equal parts of the tree once where that takes fewer bits")
+      ->group(kGroup);
+  verb.add_flag("--proxy-materials", options.materials,
+                "Store the colour of the material of each voxel, from a palette of at most 256; not with --proxy-dag")
+      ->group(kGroup);
+}
+
+ProxyConfig make_proxy_config(const ProxyOptions& options) {
+  ProxyConfig config;
+  if (options.proxy == kNoProxy) {
+    if (options.voxels || options.rule || options.fill || options.dag || options.materials)
+      throw Error(ErrorKind::kUsage, "the --proxy- options require --proxy voxels");
+    return config;
+  }
+  config.use = ProxyUse::kVoxels;
+  config.voxels = options.voxels.value_or(config.voxels);
+  if (config.voxels < 1 || config.voxels > kMaxGridSize)
+    throw Error(ErrorKind::kUsage,
+                "--proxy-voxels must be 1 to " + std::to_string(kMaxGridSize) + ", the largest grid");
+  if (options.rule == kThinName) config.rule = VoxelRule::kThin;
+  config.fill = options.fill, config.dag = options.dag, config.materials = options.materials;
+  if (config.dag && config.materials)
+    throw Error(ErrorKind::kUsage, "--proxy-dag and --proxy-materials exclude each other: equal parts of the tree may "
+                                   "have other materials");
+  return config;
+}
+
+} // namespace packtrace

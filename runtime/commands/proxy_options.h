@@ -1,0 +1,25 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "compress/bake/proxies/proxy_config.h"
+
+namespace packtrace {
+
+/// The proxy options of `bake`.
+struct ProxyOptions {
+  std::string proxy = "off";
+  std::optional<uint32_t> voxels;
+  std::optional<std::string> rule;
+  bool fill = false, dag = false, materials = false;
+};
+
+void add_proxy_options(CLI::App& verb, ProxyOptions& options);
+
+/// Throws Error(kUsage) for values out of range and contradictory options.
+ProxyConfig make_proxy_config(const ProxyOptions& options);
+
+} // namespace packtrace
