@@ -8,7 +8,7 @@ packages=(
   g++ cmake ninja-build pkg-config
   libtbb-dev libglm-dev libembree-dev libopenexr-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev libjpeg-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
-  libdraco-dev libtinygltf-dev libmeshoptimizer-dev # glTF
+  libdraco-dev libmeshoptimizer-dev libwebp-dev # glTF
   libvulkan-volk-dev libvulkan-dev glslang-tools spirv-tools # backend gpu
 )
 for argument in "$@"; do
@@ -16,7 +16,7 @@ for argument in "$@"; do
     window) packages+=(libglfw3-dev libimgui-dev libopengl-dev libtomlplusplus-dev) ;; # of packtrace view
     tests)
       packages+=(
-        ccache libgtest-dev libopenmesh-dev python3
+        ccache libgtest-dev libopenmesh-dev libtinygltf-dev python3
         mesa-vulkan-drivers vulkan-validationlayers # run GLSL on the CPU, with its use of Vulkan checked
         xvfb xdotool libgl1-mesa-dri # the viewer in a window: a display, keys and mouse, OpenGL in software
         dpkg-dev file # Debian packages of packtrace itself

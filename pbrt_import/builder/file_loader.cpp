@@ -50,6 +50,7 @@ void FileLoader::read_ply_file(PlyFile& file, Mesh& mesh) const {
     PlyMesh ply = read_ply(bytes, report, &outcome.memory);
     outcome.dropped_triangles = ply.dropped_triangles;
     if (ply.mesh.triangles.empty()) throw Error(ErrorKind::kInput, "no triangle is left");
+    ply.mesh.lattice = mesh.lattice; // the shape states it
     mesh = std::move(ply.mesh);
     mesh.name = file.path.filename().string();
   });

@@ -78,6 +78,7 @@ private:
   void add_shape(Directive& directive);
   bool make_mesh(Directive& directive, Shape& shape);
   bool make_ply_mesh(const Directive& directive, Shape& shape);
+  LatticeStep read_lattice(const Directive& directive);
   bool make_inline_mesh(Directive& directive, Shape& shape);
   bool make_or_queue(MeshQueue::Entry&& entry);
   void count_kept(const Directive& directive);

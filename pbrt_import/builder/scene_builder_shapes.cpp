@@ -2,6 +2,7 @@
 #include "pbrt_import/builder/scene_builder.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "pbrt_import/builder/outer_sides.h"
 #include "pbrt_import/builder/scene_pruning.h"
@@ -78,6 +79,19 @@ bool SceneBuilder::make_mesh(Directive& directive, Shape& shape) {
   return directive.names[0] == "plymesh" ? make_ply_mesh(directive, shape) : make_inline_mesh(directive, shape);
 }
 
+/// Reads "integer lattice", which exports of baked files state: mantissa and exponent of the positions' lattice.
+LatticeStep SceneBuilder::read_lattice(const Directive& directive) {
+  const std::span<const int32_t> values = directive.parameters.integers("lattice");
+  if (values.empty()) return {};
+  constexpr int32_t kMaxExponent = 900;
+  if (values.size() != 2 || values[0] < 8 || values[0] > 15 || std::abs(values[1]) > kMaxExponent) {
+    reporter_.error(directive.place, "\"integer lattice\" takes a mantissa of 8 to 15 and an exponent of -900 to 900; "
+                                     "it is ignored");
+    return {};
+  }
+  return {static_cast<uint32_t>(values[0]), values[1]};
+}
+
 bool SceneBuilder::make_ply_mesh(const Directive& directive, Shape& shape) {
   const Parameter* const file = directive.parameters.find("filename", {ParameterType::kString});
   if (!file || file->strings.size() != 1) {
@@ -90,7 +104,7 @@ bool SceneBuilder::make_ply_mesh(const Directive& directive, Shape& shape) {
   if (path.empty()) return false;
   const auto slot = static_cast<uint32_t>(scene_.meshes.size());
   shape.mesh = loader_.request_ply(path, directive.place, slot);
-  if (shape.mesh == slot) scene_.meshes.emplace_back();
+  if (shape.mesh == slot) scene_.meshes.emplace_back().lattice = read_lattice(directive);
   return true;
 }
 
@@ -108,6 +122,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   entry.sequence = reporter_.sequence();
   entry.slot = static_cast<uint32_t>(scene_.meshes.size());
   const std::string problem = problem_of([&] { entry.job = kind->read(directive.parameters, report); });
+  if (kind->name == "trianglemesh") entry.job.given.lattice = read_lattice(directive);
   directive.memory.release(); // large arrays have moved into the job
   if (!problem.empty()) return skip_shape(name, directive.place, problem);
   if (entry.job.scale != 1.0) {

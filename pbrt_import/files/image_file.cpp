@@ -28,6 +28,7 @@
 #include "pbrt_import/files/jpeg.h"
 #include "pbrt_import/files/radiance.h"
 #include "pbrt_import/files/tga.h"
+#include "pbrt_import/files/webp.h"
 #include "pbrt_import/scene/albedo_texture.h"
 #include "pbrt_import/text/number.h"
 
@@ -106,13 +107,13 @@ std::unique_ptr<Sample, StbFree> decode_png(std::span<const std::byte> bytes, in
 }
 
 /// Mask of the pixels whose alpha is at least a cutoff.
-std::vector<uint32_t> alpha_bits(std::span<const std::byte> png, const PngHeader& header, float cutoff) {
-  const auto pixels = decode_png(png, 4, stbi_load_from_memory);
-  const size_t words = AlphaMask::row_words(header.width);
-  std::vector<uint32_t> bits(words * header.height, 0);
-  const stbi_uc* alpha = pixels.get() + 3;
-  for (size_t y = 0; y < header.height; ++y)
-    for (size_t x = 0; x < header.width; ++x, alpha += 4)
+/// @param rgba 4 bytes per pixel
+std::vector<uint32_t> alpha_bits(const uint8_t* rgba, size_t width, size_t height, float cutoff) {
+  const size_t words = AlphaMask::row_words(static_cast<uint32_t>(width));
+  std::vector<uint32_t> bits(words * height, 0);
+  const uint8_t* alpha = rgba + 3;
+  for (size_t y = 0; y < height; ++y)
+    for (size_t x = 0; x < width; ++x, alpha += 4)
       if (static_cast<float>(*alpha) / 255.0f >= cutoff) bits[y * words + x / 32] |= 1u << (x % 32);
   return bits;
 }
@@ -162,7 +163,9 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
     summary = grey ? summarize_bytes<1>(pixels.get(), header.width, header.height, wants, linear)
                    : summarize_bytes<3>(pixels.get(), header.width, header.height, wants, linear);
   }
-  if (wants.mask && wants.alpha_cutoff) summary.nonzero = alpha_bits(bytes, header, *wants.alpha_cutoff);
+  if (wants.mask && wants.alpha_cutoff)
+    summary.nonzero =
+        alpha_bits(decode_png(bytes, 4, stbi_load_from_memory).get(), header.width, header.height, *wants.alpha_cutoff);
   if (header.wrong_checksums > 0)
     summary.problems.push_back(header.wrong_checksums == 1
                                    ? std::string("a chunk has a wrong checksum; the image may be damaged")
@@ -174,7 +177,7 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
 /// TGA has no magic number, so it is tried for files that match no other format.
 ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
   const std::optional<TgaHeader> header = parse_tga_header(bytes);
-  if (!header) fail("not an image in a known format (PNG, JPEG, TGA, EXR, PFM, HDR)");
+  if (!header) fail("not an image in a known format (PNG, JPEG, WebP, TGA, EXR, PFM, HDR)");
   constexpr uint64_t kPixelsPerByte = 64; // a run of up to 128 pixels takes at least two bytes
   const ClaimedImageSize size{header->width, header->height, kPixelsPerByte};
   size.check(bytes.size(), size.width * size.height * 3, wants, memory);
@@ -211,6 +214,20 @@ ImageSummary read_jpeg(std::span<const std::byte> bytes, bool decode_srgb, Image
   ImageSummary summary = summarizer.finish();
   if (const std::string problem = reader.problem(); !problem.empty())
     summary.problems.push_back("the image may be damaged: " + problem);
+  return summary;
+}
+
+ImageSummary read_webp(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants,
+                       MemoryReservation& memory) {
+  const WebpReader reader(bytes);
+  constexpr uint64_t kPixelsPerByte = uint64_t{1} << 20; // lossless images of one colour take a few bytes
+  const ClaimedImageSize size{reader.width(), reader.height(), kPixelsPerByte};
+  size.check(bytes.size(), reader.working_bytes(), wants, memory);
+  const std::vector<uint8_t> pixels = reader.decode();
+  ImageSummary summary =
+      summarize_bytes<4>(pixels.data(), reader.width(), reader.height(), wants, linear_of_bytes(decode_srgb));
+  if (wants.mask && wants.alpha_cutoff)
+    summary.nonzero = alpha_bits(pixels.data(), reader.width(), reader.height(), *wants.alpha_cutoff);
   return summary;
 }
 
@@ -350,8 +367,9 @@ ImageSummary read_by_format(std::span<const std::byte> bytes, bool decode_srgb, 
   if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, wants, memory);
   if (text.starts_with("#?")) return read_hdr(bytes, wants, memory);
   if (const std::string_view name = other_format(text); !name.empty())
-    fail("images in " + std::string(name) + " format are not read, only PNG, JPEG, TGA, EXR, PFM and HDR");
+    fail("images in " + std::string(name) + " format are not read, only PNG, JPEG, WebP, TGA, EXR, PFM and HDR");
   if (text.starts_with("\xff\xd8\xff")) return read_jpeg(bytes, decode_srgb, wants, memory);
+  if (WebpReader::is_webp(bytes)) return read_webp(bytes, decode_srgb, wants, memory);
   return text.starts_with("\x89PNG") ? read_png(bytes, decode_srgb, wants, memory)
                                      : read_tga(bytes, decode_srgb, wants, memory);
 }
@@ -362,7 +380,8 @@ ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, Imag
                         MemoryReservation& memory) {
   ImageSummary summary = read_by_format(bytes, decode_srgb, wants, memory);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (wants.alpha_cutoff && !text.starts_with("\x89PNG")) std::ranges::fill(summary.nonzero, ~0u); // no alpha is read
+  const bool has_alpha = text.starts_with("\x89PNG") || WebpReader::is_webp(bytes);
+  if (wants.alpha_cutoff && !has_alpha) std::ranges::fill(summary.nonzero, ~0u); // no alpha is read
   return summary;
 }
 

@@ -38,9 +38,9 @@ struct ImageWants {
 /// Only the average is kept of images with more texels.
 inline constexpr uint64_t kMaxTextureTexels = uint64_t{1} << 26;
 
-/// Reads the formats of pbrt, which are PNG, TGA, OpenEXR and PFM, and also HDR and JPEG. Alpha channels are ignored,
-/// as in pbrt, unless ImageWants::alpha_cutoff is set, which applies to PNG. Other formats are rejected with their
-/// name.
+/// Reads the formats of pbrt, which are PNG, TGA, OpenEXR and PFM, and also HDR, JPEG and WebP. Alpha channels are
+/// ignored, as in pbrt, unless ImageWants::alpha_cutoff is set, which applies to PNG and WebP. Other formats are
+/// rejected with their name.
 /// @param bytes the whole file
 /// @param decode_srgb whether values of the integer formats are sRGB-encoded
 /// @param memory grows by the memory that the summary and decoding need, before it is allocated

@@ -14,13 +14,23 @@ namespace {
 
 [[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
-constexpr std::array<std::string_view, 16> kKnownExtensions = {
-    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "KHR_draco_mesh_compression",
-    "KHR_lights_punctual",        "KHR_materials_clearcoat", "KHR_materials_emissive_strength",
-    "KHR_materials_ior",          "KHR_materials_sheen",     "KHR_materials_specular",
-    "KHR_materials_transmission", "KHR_materials_unlit",     "KHR_materials_volume",
-    "KHR_mesh_quantization",      "KHR_texture_transform",   "KHR_materials_anisotropy",
-    "KHR_materials_iridescence"};
+constexpr std::array<std::string_view, 17> kKnownExtensions = {"EXT_mesh_gpu_instancing",
+                                                               "EXT_meshopt_compression",
+                                                               "EXT_texture_webp",
+                                                               "KHR_draco_mesh_compression",
+                                                               "KHR_lights_punctual",
+                                                               "KHR_materials_clearcoat",
+                                                               "KHR_materials_emissive_strength",
+                                                               "KHR_materials_ior",
+                                                               "KHR_materials_sheen",
+                                                               "KHR_materials_specular",
+                                                               "KHR_materials_transmission",
+                                                               "KHR_materials_unlit",
+                                                               "KHR_materials_volume",
+                                                               "KHR_mesh_quantization",
+                                                               "KHR_texture_transform",
+                                                               "KHR_materials_anisotropy",
+                                                               "KHR_materials_iridescence"};
 
 uint32_t read_word(std::span<const std::byte> bytes, size_t at) {
   uint32_t word;

@@ -61,6 +61,17 @@ std::string Materials::image_file(uint64_t number) {
   return name;
 }
 
+namespace {
+
+/// Number of a texture's image; WebP is preferred to its fallback.
+uint64_t image_of(const Value& texture) {
+  if (const std::optional<Value> webp = texture.extension("EXT_texture_webp"))
+    if (const std::optional<uint64_t> source = webp->find_integer("source")) return *source;
+  return texture.at("source").integer();
+}
+
+} // namespace
+
 void Materials::read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset) {
   use.uv_set = info.find_integer("texCoord").value_or(0);
   const std::optional<Value> transform = info.extension("KHR_texture_transform");
@@ -95,7 +106,7 @@ std::string Materials::define_image(const Value& info, MaterialUse& use, std::st
     scale = Vec2(1.0f), offset = Vec2(0.0f);
   }
   const std::string name = use.name + ": " + std::string(what);
-  const std::string file = image_file(texture.at("source").integer());
+  const std::string file = image_file(image_of(texture));
   DirectiveFeed& feed = document_.context().feed;
   feed.begin("Texture", document_.place(), {name, cutoff ? "float" : "spectrum", "imagemap"});
   feed.text("filename", file);

@@ -124,6 +124,28 @@ void convert_uvs(std::vector<float>& uvs, const MaterialUse& use) {
   }
 }
 
+/// The lattice of the positions: the one that the mesh or the document states, as exports do, or that of integers.
+std::optional<std::vector<int32_t>> lattice_of(Document& document, const Value& mesh, const Value& primitive) {
+  if (primitive.find("targets")) return std::nullopt; // morphing leaves it
+  constexpr const char* kLattice = "packtrace_lattice";
+  for (const Value& owner : {mesh, document.root().at("asset")}) {
+    const std::optional<Value> extras = owner.find("extras");
+    if (!extras || !extras->has(kLattice)) continue;
+    const std::vector<double> values = extras->at(kLattice).numbers(2);
+    constexpr double kLimit = 1e9; // beyond it the importer reports them
+    std::vector<int32_t> lattice;
+    for (const double value : values) lattice.push_back(static_cast<int32_t>(std::clamp(value, -kLimit, kLimit)));
+    return lattice;
+  }
+  const std::optional<uint64_t> positions = primitive.at("attributes").find_integer("POSITION");
+  if (!positions) return std::nullopt;
+  const Value accessor = document.element("accessors", *positions);
+  constexpr uint64_t kFloat = 5126;
+  const std::optional<Value> normalized = accessor.find("normalized");
+  if (accessor.at("componentType").integer() == kFloat || (normalized && normalized->flag())) return std::nullopt;
+  return std::vector<int32_t>{8, -3}; // steps of 1
+}
+
 } // namespace
 
 void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh_value,
@@ -162,6 +184,8 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
   if (!mesh.normals.empty()) feed.floats(ParameterType::kNormal, "N", mesh.normals);
   if (!mesh.uvs.empty()) feed.floats(ParameterType::kFloat, "uv", mesh.uvs);
   feed.integers("indices", indices);
+  if (const std::optional<std::vector<int32_t>> lattice = lattice_of(document, mesh_value, primitive))
+    feed.integers("lattice", *lattice);
   if (use.absent)
     feed.number("alpha", 0.0f);
   else if (!use.opacity.empty())

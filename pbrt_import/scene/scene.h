@@ -17,6 +17,13 @@
 
 namespace packtrace {
 
+/// Step of a lattice through 0: mantissa 2^exponent.
+struct LatticeStep {
+  uint32_t mantissa = 0; ///< 8..15; 0: there is no lattice
+  int32_t exponent = 0;
+  bool operator==(const LatticeStep&) const = default;
+};
+
 /// A triangle mesh in the space of the shape that defines it. All indices are in range, all positions are finite, and
 /// no triangle repeats an index; normals and uvs are empty or have one element per vertex.
 /// The geometric normal is cross(p1 - p0, p2 - p0) in this space. normal_matrix() transforms it to other spaces, so
@@ -27,6 +34,8 @@ struct Mesh {
   std::vector<Vec3> normals; ///< of unit length; empty: flat shading
   std::vector<Vec2> uvs;
   std::vector<Triangle> triangles;
+  /// Lattice that its file states for the positions: they are its points, rounded to floats. Not checked.
+  LatticeStep lattice{};
 };
 
 inline constexpr uint32_t kNoMask = ~0u;

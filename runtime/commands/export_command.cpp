@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +14,7 @@
 #include "pbrt_import/base/file_error.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
+#include "runtime/commands/export_reports.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
@@ -22,122 +24,73 @@
 namespace packtrace {
 namespace {
 
-constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kDraco = "draco", *kNone = "none";
+constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kDraco = "draco", *kMeshopt = "meshopt",
+                     *kNone = "none", *kPortable = "portable", *kWeb = "web", *kExchange = "exchange";
 
 struct ExportOptions {
   std::string input, output;
   std::string layout; ///< empty: chosen by the output's extension
-  std::string codec = kDraco;
-  GltfConfig gltf;
+  std::string profile = kExchange;
+  std::optional<std::string> codec;
+  std::optional<int> level, normal_bits, uv_bits;
+  std::optional<double> webp_psnr;
+  bool instancing = false, levels = false;
   bool has_gltf_option = false; ///< whether an option was given that applies to glTF only
 };
 
 /// The exported file and its reports.
 struct Exported {
   std::vector<std::byte> bytes;
+  std::vector<std::byte> buffer; ///< beside a .gltf file
   nlohmann::json json;
   std::string text;
 };
 
-nlohmann::json to_json(const ExportOptions& options, const Vertex16Report& r) {
-  return {{"verb", "export"},
-          {"input", options.input},
-          {"output", options.output},
-          {"layout", kVertex16},
-          {"geometries", r.geometries},
-          {"draws", r.draws},
-          {"instances", r.instances},
-          {"materials", r.materials},
-          {"vertices", r.vertices},
-          {"triangles", r.triangles},
-          {"bytes", {{"vertices", r.vertex_bytes}, {"indices", r.index_bytes}, {"total", r.file_bytes}}},
-          {"coarser_geometries", r.coarser_geometries},
-          {"max_position_error", r.max_position_error},
-          {"max_normal_error_degrees", r.max_normal_error_degrees},
-          {"max_uv_error", r.max_uv_error},
-          {"max_tangent_error_degrees", r.max_tangent_error_degrees},
-          {"peak_rss_bytes", peak_rss_bytes()}};
-}
-
-std::string to_text(const ExportOptions& options, const Vertex16Report& r) {
-  const double per = r.triangles > 0 ? 1.0 / static_cast<double>(r.triangles) : 0.0;
-  std::string text = fmt::format(
-      grouped(),
-      "{}: {:L} vertices, {:L} triangles in {:L} draws of {:L} geometries; {:L} bytes, {:.2f} per triangle "
-      "({:.2f} vertices, {:.2f} indices)\n"
-      "maximum error against the .ptk file: position {:.3g}   normal {:.4f} degrees   uv {:.3g}   tangent {:.3f} "
-      "degrees\n",
-      options.output, r.vertices, r.triangles, r.draws, r.geometries, r.file_bytes,
-      static_cast<double>(r.file_bytes) * per, static_cast<double>(r.vertex_bytes) * per,
-      static_cast<double>(r.index_bytes) * per, r.max_position_error, r.max_normal_error_degrees, r.max_uv_error,
-      r.max_tangent_error_degrees);
-  if (r.coarser_geometries > 0)
-    text +=
-        fmt::format(grouped(), "{:L} geometries span more than 2^21 grid steps and were rounded to a coarser grid\n",
-                    r.coarser_geometries);
-  return text;
-}
-
-nlohmann::json to_json(const ExportOptions& options, const GltfReport& r) {
-  return {{"verb", "export"},
-          {"input", options.input},
-          {"output", options.output},
-          {"layout", kGltf},
-          {"codec", options.codec},
-          {"meshes", r.meshes},
-          {"primitives", r.primitives},
-          {"nodes", r.nodes},
-          {"grouped_instances", r.grouped_instances},
-          {"materials", r.materials},
-          {"images", r.images},
-          {"cameras", r.cameras},
-          {"vertices", r.vertices},
-          {"triangles", r.triangles},
-          {"bytes", {{"geometry", r.geometry_bytes}, {"images", r.image_bytes}, {"total", r.file_bytes}}},
-          {"collapsed_triangles", r.collapsed_triangles},
-          {"plain_primitives", r.plain_primitives},
-          {"simplified_materials", r.simplified_materials},
-          {"skipped_cameras", r.skipped_cameras},
-          {"peak_rss_bytes", peak_rss_bytes()}};
-}
-
-std::string to_text(const ExportOptions& options, const GltfReport& r) {
-  const double per = r.triangles > 0 ? 1.0 / static_cast<double>(r.triangles) : 0.0;
-  std::string text = fmt::format(
-      grouped(),
-      "{}: {:L} vertices, {:L} triangles in {:L} primitives; {:L} meshes, {:L} nodes, {:L} materials, {:L} images, "
-      "{:L} cameras\n{:L} bytes: geometry {:L} ({:.2f} per triangle), images {:L}\n",
-      options.output, r.vertices, r.triangles, r.primitives, r.meshes, r.nodes, r.materials, r.images, r.cameras,
-      r.file_bytes, r.geometry_bytes, static_cast<double>(r.geometry_bytes) * per, r.image_bytes);
-  const auto note = [&](uint64_t count, const char* what) {
-    if (count > 0) text += fmt::format(grouped(), "{:L} {}\n", count, what);
-  };
-  note(r.collapsed_triangles, "degenerate triangles (with two equal corners) were dropped by Draco");
-  note(r.plain_primitives, "primitives are stored as floats: they need more than 30 bits, or Draco cannot encode them");
-  note(r.simplified_materials, "materials lost their texture, because it is mapped differently from their alpha mask");
-  note(r.skipped_cameras, "cameras were skipped, because glTF has no environment cameras");
-  return text;
+/// The file of a .gltf file's buffer.
+std::filesystem::path buffer_file(const ExportOptions& options) {
+  return std::filesystem::path(options.output).replace_extension(".bin");
 }
 
 /// Returns the layout from --layout, or else the one that the output's extension implies. Throws Error(kUsage) if they
 /// contradict each other or neither is known.
 std::string layout_of(const ExportOptions& options) {
   const std::string ending = ending_of(options.output);
-  if (ending == ".gltf")
-    throw FileError(ErrorKind::kUsage, options.output,
-                    "glTF is written as a single binary file; use the extension .glb");
+  const bool is_gltf = ending == ".glb" || ending == ".gltf";
   const std::string layout = !options.layout.empty() ? options.layout
-                             : ending == ".glb"      ? kGltf
+                             : is_gltf               ? kGltf
                              : ending == ".v16"      ? kVertex16
                                                      : "";
-  refuse_foreign_ending(options.output, {".glb", ".v16"}, "export", {});
+  refuse_foreign_ending(options.output, {".glb", ".gltf", ".v16"}, "export", {});
   if (layout.empty() && options.output == "-")
     throw Error(ErrorKind::kUsage, "-o - has no extension to choose a layout by; add --layout gltf or vertex16");
   if (layout.empty())
-    throw FileError(ErrorKind::kUsage, options.output, "use the extension .glb or .v16, or add --layout");
-  if ((ending == ".glb" && layout != kGltf) || (ending == ".v16" && layout != kVertex16))
+    throw FileError(ErrorKind::kUsage, options.output, "use the extension .glb, .gltf or .v16, or add --layout");
+  if ((is_gltf && layout != kGltf) || (ending == ".v16" && layout != kVertex16))
     throw FileError(ErrorKind::kUsage, options.output, "the extension does not match --layout " + layout);
   return layout;
+}
+
+/// The profile's settings with those that options replace.
+GltfConfig gltf_config(const ExportOptions& options) {
+  GltfConfig config = gltf_profile(options.profile == kPortable ? GltfProfile::kPortable
+                                   : options.profile == kWeb    ? GltfProfile::kWeb
+                                                                : GltfProfile::kExchange);
+  if (options.codec)
+    config.codec = *options.codec == kDraco     ? GltfCodec::kDraco
+                   : *options.codec == kMeshopt ? GltfCodec::kMeshopt
+                                                : GltfCodec::kNone;
+  if (options.level) config.draco.level = *options.level;
+  if (options.normal_bits) config.draco.normal_bits = config.meshopt_normal_bits = *options.normal_bits;
+  if (options.uv_bits) config.draco.uv_bits = *options.uv_bits;
+  if (options.webp_psnr) config.webp_psnr = *options.webp_psnr;
+  config.instancing |= options.instancing;
+  config.levels |= options.levels;
+  if (ending_of(options.output) == ".gltf") config.buffer_name = buffer_file(options).filename().string();
+  return config;
+}
+
+std::string name_of(GltfCodec codec) {
+  return codec == GltfCodec::kDraco ? kDraco : codec == GltfCodec::kMeshopt ? kMeshopt : kNone;
 }
 
 Exported export_file(const ExportOptions& options, const std::string& layout, const MemoryBudget& budget,
@@ -147,28 +100,38 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
                     "not a packtrace baked file; create one with packtrace bake SCENE.pbrt -o FILE.ptk");
   const MemoryReservation memory = reserve_decoded(options.input, budget);
   const BakedFile file = BakedFile::open(options.input);
+  ExportNames names{options.input, options.output, {}, {}};
   if (layout == kGltf) {
-    GltfConfig config = options.gltf;
-    config.draco = options.codec == kDraco;
+    const GltfConfig config = gltf_config(options);
+    names.profile = options.profile, names.codec = name_of(config.codec);
     GltfExport result = export_gltf(file, config, progress);
-    return {std::move(result.bytes), to_json(options, result.report), to_text(options, result.report)};
+    return {std::move(result.bytes), std::move(result.buffer), to_json(names, result.report),
+            to_text(names, result.report)};
   }
   Vertex16Export result = export_vertex16(file, progress);
-  return {std::move(result.bytes), to_json(options, result.report), to_text(options, result.report)};
+  return {std::move(result.bytes), {}, to_json(names, result.report), to_text(names, result.report)};
 }
 
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
   if (layout == kVertex16 && options.has_gltf_option)
-    throw Error(ErrorKind::kUsage,
-                "--codec, --level, --normal-bits, --uv-bits and --instancing only apply to --layout gltf");
+    throw Error(
+        ErrorKind::kUsage,
+        "--profile, --codec, --level, --normal-bits, --uv-bits, --webp-psnr, --instancing and --levels only apply "
+        "to --layout gltf");
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
+  std::optional<OutputFile> buffer;
+  if (ending_of(options.output) == ".gltf") buffer.emplace(buffer_file(options), globals.force);
   refuse_to_replace({options.input});
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const Exported result = export_file(options, layout, globals.memory, progress);
+  if (buffer) {
+    buffer->write(result.buffer);
+    buffer->commit();
+  }
   output.write(result.bytes);
   display.finish();
   if (json.wanted()) json.write(result.json);
@@ -177,55 +140,71 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   return 0;
 }
 
+/// Adds the options that apply to glTF only.
+void add_gltf_options(CLI::App& verb, ExportOptions& options) {
+  const auto of_gltf = [&options](const std::string&) { options.has_gltf_option = true; };
+  verb.add_option("--profile", options.profile,
+                  "What a glTF file is for. portable uses no extension, so every viewer reads it; web is small and "
+                  "decodes fast in browsers: integers with EXT_meshopt_compression, instances with "
+                  "EXT_mesh_gpu_instancing, WebP images; exchange is for other programs: Draco, all names (default "
+                  "exchange). The options below replace single settings of a profile")
+      ->check(one_of({kPortable, kWeb, kExchange}))
+      ->each(of_gltf)
+      ->capture_default_str();
+  verb.add_option("--codec", options.codec,
+                  "Geometry compression for gltf. draco uses KHR_draco_mesh_compression, meshopt "
+                  "EXT_meshopt_compression; none stores floats")
+      ->check(one_of({kDraco, kMeshopt, kNone}))
+      ->each(of_gltf);
+  verb.add_option("--level", options.level, "Draco compression level, 0 (fastest) to 10 (smallest file) (default 7)")
+      ->check(CLI::Range(0, 10))
+      ->each(of_gltf);
+  verb.add_option("--normal-bits", options.normal_bits,
+                  "Quantisation bits of octahedral normals: Draco 2..30 (default 12), meshopt 4..16 (default 8)")
+      ->check(CLI::Range(2, 30))
+      ->each(of_gltf);
+  verb.add_option("--uv-bits", options.uv_bits,
+                  "Draco quantisation bits of texture coordinates over their range, 1..30 (default 14). Raise it if "
+                  "textures shift. meshopt takes as many as an eighth of a texel needs")
+      ->check(CLI::Range(1, 30))
+      ->each(of_gltf);
+  verb.add_option("--webp-psnr", options.webp_psnr,
+                  "Write images as WebP of at least this PSNR in dB, 0..100; 100 is lossless, 0 writes PNG (default 40 "
+                  "for web, else 0)")
+      ->check(CLI::Range(0.0, 100.0))
+      ->each(of_gltf);
+  verb.add_flag("--instancing", options.instancing,
+                "Store the instances of a mesh in one node with EXT_mesh_gpu_instancing: much smaller files of many "
+                "instances, for viewers that know the extension")
+      ->each(of_gltf);
+  verb.add_flag("--levels", options.levels,
+                "Write levels of detail with MSFT_lod, with the screen coverage at which their error is a pixel")
+      ->each(of_gltf);
+}
+
 } // namespace
 
 void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App& verb = add_verb(app, globals, "export", "Convert a .ptk file to glTF or to a GPU vertex layout",
                             [options, &globals] { return run(*options, globals); });
-  const auto of_gltf = [options](const std::string&) { options->has_gltf_option = true; };
   verb.add_option("FILE", options->input, ".ptk file to convert")->required();
   add_output_option(verb, options->output,
-                    "Output file (required), .glb or .v16, or - for standard output together with --layout");
+                    "Output file (required), .glb, .gltf or .v16, or - for standard output together with --layout");
   verb.add_option("--layout", options->layout,
-                  "Output format. gltf is a binary glTF 2.0 file with materials, instances, textures and cameras; "
+                  "Output format. gltf is a glTF 2.0 file with materials, instances, textures and cameras; "
                   "vertex16 has 16 bytes per vertex and 16- or 32-bit indices, for direct upload to a GPU (default: "
-                  "gltf for .glb, vertex16 for .v16)")
+                  "gltf for .glb and .gltf, vertex16 for .v16)")
       ->check(one_of({kVertex16, kGltf}));
-  verb.add_option(
-          "--codec", options->codec,
-          "Geometry compression for gltf. draco uses KHR_draco_mesh_compression; none stores floats, which every "
-          "glTF viewer can read (default draco)")
-      ->check(one_of({kDraco, kNone}))
-      ->each(of_gltf)
-      ->capture_default_str();
-  verb.add_option("--level", options->gltf.codec.level,
-                  "Draco compression level, 0 (fastest) to 10 (smallest file) (default 7)")
-      ->check(CLI::Range(0, 10))
-      ->each(of_gltf)
-      ->capture_default_str();
-  verb.add_option("--normal-bits", options->gltf.codec.normal_bits,
-                  "Draco quantisation bits of octahedral normals, 2..30 (default 12)")
-      ->check(CLI::Range(2, 30))
-      ->each(of_gltf)
-      ->capture_default_str();
-  verb.add_option("--uv-bits", options->gltf.codec.uv_bits,
-                  "Draco quantisation bits of texture coordinates over their range, 1..30 (default 14). Raise it if "
-                  "textures shift")
-      ->check(CLI::Range(1, 30))
-      ->each(of_gltf)
-      ->capture_default_str();
-  verb.add_flag("--instancing", options->gltf.instancing,
-                "Store the instances of a mesh in one node with EXT_mesh_gpu_instancing: much smaller files of many "
-                "instances, for viewers that know the extension")
-      ->each(of_gltf);
+  add_gltf_options(verb, *options);
   verb.footer("vertex16 packs position (3 x 21 bits), normal (24), tangent (1 + 8) and uv\n"
               "(2 x 16) of a vertex. docs/vertex16.md describes the file;\n"
               "compress/exchange/vertex16/vertex16.glsl and vertex16_decode.h decode it. Positions in glTF\n"
               "files lie on the grid of the .ptk file.\n"
               "Examples:\n"
               "  packtrace export house.ptk -o house.v16\n"
-              "  packtrace export house.ptk -o house.glb --level 10\n"
+              "  packtrace export house.ptk -o house.glb --profile web\n"
+              "  packtrace export house.ptk -o house.gltf --profile portable\n"
               "  packtrace export house.ptk -o - --layout gltf | gltf_viewer /dev/stdin");
 }
 

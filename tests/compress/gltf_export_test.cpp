@@ -1,141 +1,23 @@
 #include "compress/exchange/gltf/gltf_export.h"
-#include "compress/exchange/gltf/gltf_instances.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <numbers>
 #include <set>
 
-#include <draco/compression/decode.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
-#include <tiny_gltf.h>
 
 #include "pbrt_import/base/error.h"
+#include "tests/compress/gltf_test_support.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
 namespace {
 
-GltfExport export_of(const BakedFile& file, const GltfConfig& config = {}) {
-  Progress progress;
-  return export_gltf(file, config, progress);
-}
-
-GltfConfig plain() {
-  GltfConfig config;
-  config.draco = false;
-  return config;
-}
-
-uint32_t word_at(const std::vector<std::byte>& bytes, size_t place) {
-  uint32_t word = 0;
-  std::memcpy(&word, bytes.data() + place, sizeof word);
-  return word;
-}
-
-/// tinygltf without Draco rejects accessors without a buffer view, as Draco primitives have them, so they get the first
-/// one.
-std::vector<std::byte> readable_without_draco(const std::vector<std::byte>& glb) {
-  constexpr size_t kHeader = 12, kChunkHeader = 8;
-  const size_t json_bytes = word_at(glb, kHeader);
-  const auto* const text = reinterpret_cast<const char*>(glb.data()) + kHeader + kChunkHeader;
-  nlohmann::json json = nlohmann::json::parse(text, text + json_bytes);
-  if (json.contains("accessors"))
-    for (nlohmann::json& accessor : json["accessors"])
-      if (!accessor.contains("bufferView")) accessor["bufferView"] = 0;
-  std::string changed = json.dump();
-  changed.resize((changed.size() + 3) / 4 * 4, ' ');
-  std::vector<std::byte> result(glb.begin(), glb.begin() + kHeader + kChunkHeader);
-  const auto set_word = [&](size_t place, size_t value) {
-    const auto word = static_cast<uint32_t>(value);
-    std::memcpy(result.data() + place, &word, sizeof word);
-  };
-  set_word(8, glb.size() - json_bytes + changed.size());
-  set_word(kHeader, changed.size());
-  const auto bytes = std::as_bytes(std::span(changed));
-  result.insert(result.end(), bytes.begin(), bytes.end());
-  result.insert(result.end(), glb.begin() + static_cast<ptrdiff_t>(kHeader + kChunkHeader + json_bytes), glb.end());
-  return result;
-}
-
-tinygltf::Model parse(const GltfExport& from) {
-  EXPECT_EQ(word_at(from.bytes, 8), from.bytes.size());
-  const std::vector<std::byte> bytes = readable_without_draco(from.bytes);
-  tinygltf::Model model;
-  std::string errors, warnings;
-  EXPECT_TRUE(tinygltf::TinyGLTF().LoadBinaryFromMemory(&model, &errors, &warnings,
-                                                        reinterpret_cast<const unsigned char*>(bytes.data()),
-                                                        static_cast<unsigned int>(bytes.size())))
-      << errors;
-  return model;
-}
-
-struct Part {
-  std::vector<Vec3> positions, normals;
-  std::vector<Vec2> uvs;
-  std::vector<Triangle> triangles;
-};
-
-template <typename Value>
-std::vector<Value> accessor_values(const tinygltf::Model& model, int accessor, size_t count) {
-  const tinygltf::BufferView& view =
-      model.bufferViews[static_cast<size_t>(model.accessors[static_cast<size_t>(accessor)].bufferView)];
-  EXPECT_EQ(view.byteLength, count * sizeof(Value));
-  std::vector<Value> values(count);
-  std::memcpy(static_cast<void*>(values.data()), model.buffers[0].data.data() + view.byteOffset, view.byteLength);
-  return values;
-}
-
-template <typename Value>
-std::vector<Value> draco_values(const draco::Mesh& mesh, const tinygltf::Value& ids, const char* name) {
-  std::vector<Value> values;
-  if (!ids.Has(name)) return values;
-  const draco::PointAttribute* const attribute =
-      mesh.GetAttributeByUniqueId(static_cast<uint32_t>(ids.Get(name).GetNumberAsInt()));
-  for (draco::PointIndex point(0); point < mesh.num_points(); ++point)
-    attribute->GetMappedValue(point, &values.emplace_back());
-  return values;
-}
-
-/// Decodes one primitive as any reader would, and checks it against its accessors.
-Part part_of(const tinygltf::Model& model, const tinygltf::Primitive& primitive) {
-  Part part;
-  const auto count = [&](int accessor) { return model.accessors[static_cast<size_t>(accessor)].count; };
-  const size_t vertices = count(primitive.attributes.at("POSITION")), indices = count(primitive.indices);
-  const auto extension = primitive.extensions.find("KHR_draco_mesh_compression");
-  if (extension == primitive.extensions.end()) {
-    part.positions = accessor_values<Vec3>(model, primitive.attributes.at("POSITION"), vertices);
-    if (primitive.attributes.count("NORMAL"))
-      part.normals = accessor_values<Vec3>(model, primitive.attributes.at("NORMAL"), vertices);
-    if (primitive.attributes.count("TEXCOORD_0"))
-      part.uvs = accessor_values<Vec2>(model, primitive.attributes.at("TEXCOORD_0"), vertices);
-    part.triangles = accessor_values<Triangle>(model, primitive.indices, indices / 3);
-    return part;
-  }
-  const tinygltf::BufferView& view =
-      model.bufferViews[static_cast<size_t>(extension->second.Get("bufferView").GetNumberAsInt())];
-  draco::DecoderBuffer buffer;
-  buffer.Init(reinterpret_cast<const char*>(model.buffers[0].data.data()) + view.byteOffset, view.byteLength);
-  const auto decoded = draco::Decoder().DecodeMeshFromBuffer(&buffer);
-  EXPECT_TRUE(decoded.ok());
-  const draco::Mesh& mesh = *decoded.value();
-  const tinygltf::Value& ids = extension->second.Get("attributes");
-  part.positions = draco_values<Vec3>(mesh, ids, "POSITION");
-  part.normals = draco_values<Vec3>(mesh, ids, "NORMAL");
-  part.uvs = draco_values<Vec2>(mesh, ids, "TEXCOORD_0");
-  for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
-    part.triangles.emplace_back(mesh.face(f)[0].value(), mesh.face(f)[1].value(), mesh.face(f)[2].value());
-  EXPECT_EQ(part.positions.size(), vertices);
-  EXPECT_EQ(3 * part.triangles.size(), indices);
-  EXPECT_EQ(part.normals.empty(), primitive.attributes.count("NORMAL") == 0);
-  EXPECT_EQ(part.uvs.empty(), primitive.attributes.count("TEXCOORD_0") == 0);
-  return part;
-}
+using namespace gltf_test;
 
 using Face = std::array<LatticePoint, 3>;
 
@@ -181,7 +63,7 @@ TEST_P(GltfCodecs, EveryTriangleStaysOnTheLattice) {
   const BakedScene baked = test::bake(test::mixed_scene());
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   GltfConfig config;
-  config.draco = GetParam();
+  config.codec = GetParam() ? GltfCodec::kDraco : GltfCodec::kNone;
   const GltfExport result = export_of(file, config);
   const tinygltf::Model model = parse(result);
   EXPECT_EQ(result.report.collapsed_triangles, 0u);
@@ -371,58 +253,9 @@ TEST(GltfExport, RefusesValuesOutOfRange) {
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   for (const DracoConfig codec : {DracoConfig{11, 12, 14}, DracoConfig{7, 1, 14}, DracoConfig{7, 12, 31}}) {
     GltfConfig config;
-    config.codec = codec;
+    config.draco = codec;
     EXPECT_THROW(export_of(file, config), Error);
   }
-}
-
-/// Map of an angle about y, scales, and a translation.
-Affine turned(double angle, Vec3 scale, Vec3 translation) {
-  const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
-  return {Vec3(c, 0, -s) * scale.x, Vec3(0, 1, 0) * scale.y, Vec3(s, 0, c) * scale.z, translation};
-}
-
-TEST(GltfInstances, MapsAreDecomposed) {
-  const std::optional<InstanceTransform> found = decompose(turned(0.5, {2, 3, 4}, {5, 6, 7}));
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->translation, (std::array<float, 3>{5, 6, 7}));
-  EXPECT_NEAR(found->scale[0], 2.0f, 1e-6f);
-  EXPECT_NEAR(found->scale[2], 4.0f, 1e-6f);
-  EXPECT_NEAR(found->rotation[1], std::sin(0.25), 1e-6);
-  EXPECT_NEAR(found->rotation[3], std::cos(0.25), 1e-6);
-  const std::optional<InstanceTransform> mirrored = decompose(turned(0.5, {1, -1, 1}, {}));
-  ASSERT_TRUE(mirrored);
-  EXPECT_LT(mirrored->scale[0] * mirrored->scale[1] * mirrored->scale[2], 0.0f);
-}
-
-TEST(GltfInstances, ShearAndFlatMapsStayMatrices) {
-  Affine sheared(1.0f);
-  sheared[1].x = 0.01f;
-  EXPECT_FALSE(decompose(sheared));
-  EXPECT_FALSE(decompose(turned(0.5, {1, 0, 1}, {})));
-}
-
-TEST(GltfInstances, ThoseOfAMeshShareANode) {
-  Scene scene = test::scene_of(test::sphere_mesh(12));
-  scene.shapes.clear();
-  scene.objects.push_back({"ball", {Shape{0, 0, false, DAffine(1.0)}}});
-  for (int i = 0; i < 5; ++i)
-    scene.instances.push_back(
-        {0, turned(0.3 * i, Vec3(1.0f + static_cast<float>(i)), {7.0f * static_cast<float>(i), 0, 0})});
-  scene.instances[3].world_from_object[1].x += 0.3f; // shears
-  const BakedScene baked = test::bake(scene);
-  const BakedFile file = BakedFile::from_bytes(baked.bytes);
-  GltfConfig config = plain();
-  const GltfExport apart = export_of(file, config);
-  config.instancing = true;
-  const GltfExport grouped = export_of(file, config);
-  EXPECT_EQ(apart.report.grouped_instances, 0u);
-  EXPECT_EQ(grouped.report.grouped_instances, scene.instances.size() - 1);
-  const tinygltf::Model model = parse(grouped);
-  EXPECT_EQ(model.extensionsRequired, std::vector<std::string>{"EXT_mesh_gpu_instancing"});
-  size_t with_extension = 0;
-  for (const tinygltf::Node& node : model.nodes) with_extension += node.extensions.count("EXT_mesh_gpu_instancing");
-  EXPECT_EQ(with_extension, 1u);
 }
 
 } // namespace

@@ -7,6 +7,7 @@
 
 #include "compress/bake/grid/grid_check.h"
 #include "compress/bake/grid/nested_grids.h"
+#include "compress/bake/grid/stated_grids.h"
 #include "compress/bake/grid/visible_changes.h"
 
 namespace packtrace {
@@ -59,18 +60,30 @@ public:
 
 private:
   bool may_refine() const { return config_.precision_kind == PrecisionKind::kPicture; }
+  bool is_stated(size_t g) const { return !stated_.grids.empty() && stated_.grids[g].has_value(); }
   bool is_empty(size_t g) const { return measure_.geometries[g].bounds.empty(); }
 
   /// Chooses the grids that config asks for, including finer ones for small things.
   void begin() {
-    if (measure_.has_world_space) out_.world = choose_grid(config_, measure_.world, 1.0);
-    if (measure_.has_world_space && (may_refine() || config_.precision_kind == PrecisionKind::kEdgeFraction))
+    if (may_refine()) stated_ = stated_grids(scene_, plan_);
+    if (stated_.world) {
+      out_.world = *stated_.world;
+      for (size_t g = 0; g < out_.grids.size(); ++g)
+        if (stated_.grids[g] && plan_.geometries[g].world_space)
+          out_.halvings[g] = static_cast<uint32_t>(out_.world.exponent - stated_.grids[g]->exponent);
+    } else if (measure_.has_world_space) {
+      out_.world = choose_grid(config_, measure_.world, 1.0);
+    }
+    if (measure_.has_world_space && !stated_.world &&
+        (may_refine() || config_.precision_kind == PrecisionKind::kEdgeFraction))
       out_.halvings = halvings_of_small_geometries(plan_, measure_.geometries, config_.precision, out_.world.step());
     for (size_t g = 0; g < out_.grids.size(); ++g) {
       if (is_empty(g)) continue; // nothing to quantise: keep the default grid
       const GeometryPlan& plan = plan_.geometries[g];
       PositionGrid& grid = out_.grids[g].grid;
-      grid = plan.world_space ? out_.world : choose_grid(config_, measure_.geometries[g], plan.max_stretch);
+      grid = plan.world_space ? out_.world
+             : is_stated(g)   ? *stated_.grids[g]
+                              : choose_grid(config_, measure_.geometries[g], plan.max_stretch);
       grid.exponent -= static_cast<int32_t>(out_.halvings[g]);
       out_.nested_geometries += out_.halvings[g] > 0;
     }
@@ -86,7 +99,7 @@ private:
   /// @return whether the step became finer
   bool refine_to(size_t g, double step) {
     PositionGrid& grid = out_.grids[g].grid;
-    if (is_empty(g) || !(step < grid.step())) return false;
+    if (is_empty(g) || is_stated(g) || !(step < grid.step())) return false;
     const GeometryMeasure& measure = measure_.geometries[g];
     const PositionGrid before = grid;
     if (plan_.geometries[g].world_space) {
@@ -250,6 +263,7 @@ private:
   const SceneMeasure& measure_;
   const BakeConfig& config_;
   Progress& progress_;
+  StatedGrids stated_; // empty unless the default precision is chosen
   std::vector<GeometryView> views_;
   std::vector<GridCheck> checks_;               // per geometry
   std::vector<VisibleChanges::Change> changes_; // per geometry

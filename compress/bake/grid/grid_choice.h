@@ -33,7 +33,8 @@ struct GridChoice {
   std::vector<Shortfall> shortfalls;
 };
 
-/// Chooses a lattice for each geometry. With PrecisionKind::kPicture, the steps satisfy bound_steps(); they are then
+/// Chooses a lattice for each geometry. With PrecisionKind::kPicture, geometries whose meshes state a lattice keep it
+/// (stated_grids()). The others' steps satisfy bound_steps(); they are then
 /// checked and halved up to three times where the check fails. With other kinds, the steps follow from config alone and
 /// are only checked.
 GridChoice choose_grids(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,

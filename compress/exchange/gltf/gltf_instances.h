@@ -2,8 +2,11 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include "compress/exchange/gltf/meshopt_streams.h"
+#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
@@ -17,6 +20,29 @@ struct InstanceTransform {
 
 /// Decomposes a map; none if it shears or flattens, so that the decomposition would move a point of the unit ball by
 /// more than 4e-6 of the map's size.
-std::optional<InstanceTransform> decompose(const Affine& map);
+std::optional<InstanceTransform> decompose_instance(const DAffine& map);
+
+/// Attributes of EXT_mesh_gpu_instancing for the instances of a mesh. All maps must decompose.
+class InstanceAttributes {
+public:
+  explicit InstanceAttributes(std::span<const DAffine> world_from_stored);
+
+  /// Adds floats to the attributes; returns their bytes.
+  uint64_t add_floats(GltfModel& model, GltfJson& attributes) const;
+
+  /// Adds values that are rounded so that no point of the mesh moves by more than about half a stored unit, and returns
+  /// the largest distance that a corner of the box moves, in world units. Changes the order of the instances.
+  /// @param stored bounds of the mesh, in units of the lattice's step
+  double add_coded(const Bounds& stored, MeshoptStreams& streams, GltfJson& attributes);
+
+private:
+  void sort();
+  double displacement(const std::vector<InstanceTransform>& rounded, const Bounds& stored) const;
+  void add_rotations(const Bounds& stored, double tolerance, std::vector<InstanceTransform>& rounded,
+                     MeshoptStreams& streams, GltfJson& attributes) const;
+
+  std::vector<DAffine> maps_;
+  std::vector<InstanceTransform> transforms_;
+};
 
 } // namespace packtrace

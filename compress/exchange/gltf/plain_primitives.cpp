@@ -47,6 +47,20 @@ uint32_t vertex_number(OpenPrimitive& to, const ClusterView& view, uint32_t v) {
 
 } // namespace
 
+void append(PlainPrimitive& to, PlainPrimitive&& from) {
+  if (to.lattice.empty()) {
+    to = std::move(from);
+    return;
+  }
+  const auto base = static_cast<uint32_t>(to.lattice.size());
+  const auto join = [](auto& all, const auto& more) { all.insert(all.end(), more.begin(), more.end()); };
+  join(to.lattice, from.lattice);
+  join(to.positions, from.positions);
+  join(to.normals, from.normals);
+  join(to.uvs, from.uvs);
+  for (const Triangle& t : from.triangles) to.triangles.push_back(t + base);
+}
+
 std::vector<PlainPrimitive> plain_primitives(const BakedFile& file, uint32_t geometry) {
   std::vector<OpenPrimitive> open;
   std::unordered_map<uint64_t, size_t> by_kind;

@@ -19,6 +19,9 @@ struct PlainPrimitive {
   std::vector<Triangle> triangles;
 };
 
+/// Appends a primitive to one with the same streams, or to an empty one. The material slot is the first one's.
+void append(PlainPrimitive& to, PlainPrimitive&& from);
+
 /// Returns the primitives of a geometry, in order of their first cluster.
 std::vector<PlainPrimitive> plain_primitives(const BakedFile& file, uint32_t geometry);
 

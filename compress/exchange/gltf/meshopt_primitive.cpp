@@ -1,0 +1,178 @@
+#include "compress/exchange/gltf/meshopt_primitive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+
+#include <meshoptimizer.h>
+
+namespace packtrace {
+namespace {
+
+constexpr int kByteBits = 8; // of a normal's component in 4 bytes; more take 8
+
+/// All stored values of a vertex.
+struct StoredVertex {
+  LatticePoint lattice{};
+  std::array<int16_t, 4> normal{};
+  std::array<float, 2> uv{};
+};
+static_assert(sizeof(StoredVertex) == 40); // no padding: it is hashed as bytes
+
+/// Rounds unit normals to octahedral codes.
+std::vector<std::array<int16_t, 4>> code_normals(const std::vector<Vec3>& normals, int bits, double& max_error) {
+  std::vector<glm::vec4> wide;
+  wide.reserve(normals.size());
+  for (const Vec3& n : normals) wide.emplace_back(n, 0.0f);
+  std::vector<std::array<int16_t, 4>> codes(normals.size());
+  // The codes of up to 8 bits are stored in bytes; they are computed in 16 bits first.
+  if (bits <= kByteBits) {
+    std::vector<std::array<int8_t, 4>> bytes(normals.size());
+    meshopt_encodeFilterOct(bytes.data(), bytes.size(), sizeof(bytes[0]), bits, &wide[0].x);
+    for (size_t i = 0; i < bytes.size(); ++i) std::copy(bytes[i].begin(), bytes[i].end(), codes[i].begin());
+    meshopt_decodeFilterOct(bytes.data(), bytes.size(), sizeof(bytes[0]));
+    for (size_t i = 0; i < bytes.size(); ++i) wide[i] = {bytes[i][0], bytes[i][1], bytes[i][2], 0.0f};
+  } else {
+    meshopt_encodeFilterOct(codes.data(), codes.size(), sizeof(codes[0]), bits, &wide[0].x);
+    std::vector<std::array<int16_t, 4>> decoded = codes;
+    meshopt_decodeFilterOct(decoded.data(), decoded.size(), sizeof(decoded[0]));
+    for (size_t i = 0; i < codes.size(); ++i) wide[i] = {decoded[i][0], decoded[i][1], decoded[i][2], 0.0f};
+  }
+  for (size_t i = 0; i < normals.size(); ++i) {
+    const double cosine = glm::dot(glm::normalize(DVec3(wide[i])), glm::normalize(DVec3(normals[i])));
+    max_error = std::max(max_error, std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi);
+  }
+  return codes;
+}
+
+std::vector<StoredVertex> stored_vertices(const PlainPrimitive& plain, int normal_bits, const UvGrid& uvs,
+                                          bool keep_uvs, double& max_error) {
+  std::vector<StoredVertex> vertices(plain.lattice.size());
+  for (size_t i = 0; i < vertices.size(); ++i) vertices[i].lattice = plain.lattice[i];
+  if (!plain.normals.empty()) {
+    const auto codes = code_normals(plain.normals, normal_bits, max_error);
+    for (size_t i = 0; i < vertices.size(); ++i) vertices[i].normal = codes[i];
+  }
+  for (size_t i = 0; keep_uvs && i < plain.uvs.size(); ++i)
+    for (int k = 0; k < 2; ++k) {
+      const double uv = double{plain.uvs[i][k]};
+      const double code = uvs.step > 0.0 ? std::round((uv - uvs.origin[k]) / uvs.step) : uv;
+      vertices[i].uv[static_cast<size_t>(k)] = static_cast<float>(code + 0.0);
+    }
+  return vertices;
+}
+
+template <class T>
+std::span<const std::byte> bytes_of_vector(const std::vector<T>& values) {
+  return std::as_bytes(std::span(values));
+}
+
+} // namespace
+
+MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits, const UvGrid& uvs, bool keep_uvs) {
+  MeshoptPrimitive result;
+  std::vector<StoredVertex> vertices =
+      stored_vertices(plain, normal_bits, uvs, keep_uvs, result.max_normal_error_degrees);
+  std::vector<unsigned> remap(vertices.size());
+  std::vector<uint32_t> corners(plain.triangles.size() * 3);
+  std::memcpy(corners.data(), plain.triangles.data(), corners.size() * sizeof(uint32_t));
+  const size_t distinct = meshopt_generateVertexRemap(remap.data(), corners.data(), corners.size(), vertices.data(),
+                                                      vertices.size(), sizeof(StoredVertex));
+  std::vector<StoredVertex> merged(distinct);
+  meshopt_remapVertexBuffer(merged.data(), vertices.data(), vertices.size(), sizeof(StoredVertex), remap.data());
+  result.indices.reserve(corners.size());
+  for (size_t i = 0; i < corners.size(); i += 3) {
+    const uint32_t a = remap[corners[i]], b = remap[corners[i + 1]], c = remap[corners[i + 2]];
+    if (a == b || b == c || a == c)
+      ++result.collapsed_triangles;
+    else
+      result.indices.insert(result.indices.end(), {a, b, c});
+  }
+  if (result.indices.empty()) return result;
+  meshopt_optimizeVertexCacheStrip(result.indices.data(), result.indices.data(), result.indices.size(), distinct);
+  merged.resize(meshopt_optimizeVertexFetch(merged.data(), result.indices.data(), result.indices.size(), merged.data(),
+                                            distinct, sizeof(StoredVertex)));
+  for (const StoredVertex& vertex : merged) {
+    result.lattice.push_back(vertex.lattice);
+    if (!plain.normals.empty()) result.normals.push_back(vertex.normal);
+    if (keep_uvs && !plain.uvs.empty()) result.uvs.push_back(vertex.uv);
+  }
+  return result;
+}
+
+std::optional<PositionFrame> position_frame(const LatticePoint& lo, const LatticePoint& hi) {
+  using Form = PositionFrame::Form;
+  const auto fits = [&](int64_t least, int64_t most) {
+    return std::ranges::all_of(lo, [&](int64_t q) { return q >= least; }) &&
+           std::ranges::all_of(hi, [&](int64_t q) { return q <= most; });
+  };
+  int64_t extent = 0;
+  for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, hi[axis] - lo[axis]);
+  if (fits(std::numeric_limits<int16_t>::min(), std::numeric_limits<int16_t>::max()))
+    return PositionFrame{Form::kShort, {}};
+  if (extent <= std::numeric_limits<uint16_t>::max()) return PositionFrame{Form::kUnsignedShort, lo};
+  if (fits(-kMaxMantissa, kMaxMantissa)) return PositionFrame{Form::kFloat, {}};
+  if (extent > kMaxMantissa) return std::nullopt;
+  return PositionFrame{Form::kFloat, lo};
+}
+
+GltfJson add_meshopt_primitive(const MeshoptPrimitive& primitive, const PositionFrame& frame, int normal_bits,
+                               const UvGrid& uvs, MeshoptStreams& streams) {
+  using Form = PositionFrame::Form;
+  GltfJson attributes;
+  LatticePoint lo = primitive.lattice.front(), hi = lo;
+  std::vector<int64_t> mantissas;
+  std::vector<std::array<uint16_t, 4>> shorts;
+  for (const LatticePoint& p : primitive.lattice) {
+    std::array<uint16_t, 4> element{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      lo[axis] = std::min(lo[axis], p[axis]), hi[axis] = std::max(hi[axis], p[axis]);
+      const int64_t stored = p[axis] - frame.origin[axis];
+      if (frame.form == Form::kFloat)
+        mantissas.push_back(stored);
+      else
+        element[axis] = static_cast<uint16_t>(stored);
+    }
+    if (frame.form != Form::kFloat) shorts.push_back(element);
+  }
+  GltfJson accessor{{"type", "VEC3"}};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    accessor["min"].push_back(lo[axis] - frame.origin[axis]);
+    accessor["max"].push_back(hi[axis] - frame.origin[axis]);
+  }
+  accessor["componentType"] = frame.form == Form::kFloat   ? kGltfFloat
+                              : frame.form == Form::kShort ? kGltfShort
+                                                           : kGltfUnsignedShort;
+  attributes["POSITION"] =
+      frame.form == Form::kFloat
+          ? streams.add({12, kGltfVertices, "EXPONENTIAL"}, exponential(mantissas, 0), std::move(accessor))
+          : streams.add({8, kGltfVertices, {}}, bytes_of_vector(shorts), std::move(accessor));
+  if (!primitive.normals.empty()) {
+    GltfJson normals{
+        {"type", "VEC3"}, {"componentType", normal_bits <= kByteBits ? kGltfByte : kGltfShort}, {"normalized", true}};
+    std::vector<std::array<int8_t, 4>> bytes;
+    if (normal_bits <= kByteBits)
+      for (const auto& n : primitive.normals)
+        bytes.push_back({static_cast<int8_t>(n[0]), static_cast<int8_t>(n[1]), static_cast<int8_t>(n[2]), 0});
+    attributes["NORMAL"] =
+        normal_bits <= kByteBits
+            ? streams.add({4, kGltfVertices, "OCTAHEDRAL"}, bytes_of_vector(bytes), std::move(normals))
+            : streams.add({8, kGltfVertices, "OCTAHEDRAL"}, bytes_of_vector(primitive.normals), std::move(normals));
+  }
+  if (!primitive.uvs.empty()) {
+    GltfJson coordinates{{"type", "VEC2"}, {"componentType", uvs.step > 0.0 ? kGltfUnsignedShort : kGltfFloat}};
+    std::vector<std::array<uint16_t, 2>> codes;
+    if (uvs.step > 0.0)
+      for (const auto& uv : primitive.uvs)
+        codes.push_back({static_cast<uint16_t>(uv[0]), static_cast<uint16_t>(uv[1])});
+    attributes["TEXCOORD_0"] =
+        uvs.step > 0.0 ? streams.add({4, kGltfVertices, {}}, bytes_of_vector(codes), std::move(coordinates))
+                       : streams.add({8, kGltfVertices, {}}, bytes_of_vector(primitive.uvs), std::move(coordinates));
+  }
+  return {{"attributes", std::move(attributes)},
+          {"indices", streams.add_indices(primitive.indices, primitive.lattice.size())}};
+}
+
+} // namespace packtrace

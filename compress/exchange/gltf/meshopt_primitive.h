@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "compress/exchange/gltf/gltf_materials.h"
+#include "compress/exchange/gltf/meshopt_streams.h"
+#include "compress/exchange/gltf/plain_primitives.h"
+
+namespace packtrace {
+
+/// Grid of the texture coordinates of a whole file: codes of 16 bits, or floats.
+struct UvGrid {
+  glm::dvec2 origin{0.0};
+  double step = 0.0; ///< 0: floats
+  UvMap map() const { return step > 0.0 ? UvMap{glm::dvec2(step), origin} : UvMap{}; }
+};
+
+/// A primitive with the values that it stores: lattice points, codes of normals and texture coordinates. Vertices with
+/// equal values are merged, triangles and vertices ordered for the codec.
+struct MeshoptPrimitive {
+  std::vector<LatticePoint> lattice;
+  std::vector<std::array<int16_t, 4>> normals; ///< x, y, unit, 0, as the filter OCTAHEDRAL stores them
+  std::vector<std::array<float, 2>> uvs;       ///< codes on the UvGrid, or floats
+  std::vector<uint32_t> indices;               ///< three per triangle; those with equal corners are left out
+  uint64_t collapsed_triangles = 0;
+  double max_normal_error_degrees = 0.0;
+};
+
+/// Rounds the values of a primitive, merges equal vertices, and orders triangles and vertices.
+/// @param normal_bits 4..16
+MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits, const UvGrid& uvs, bool keep_uvs);
+
+/// How the integers of positions are stored, so that the object-space position is step * (stored + origin).
+struct PositionFrame {
+  enum class Form : uint8_t { kShort, kUnsignedShort, kFloat } form = Form::kShort;
+  LatticePoint origin{};
+};
+
+/// The smallest form that holds all points from lo to hi; none if their extent exceeds 24 bits.
+std::optional<PositionFrame> position_frame(const LatticePoint& lo, const LatticePoint& hi);
+
+/// Adds accessors for the primitive; returns the glTF primitive without a material.
+GltfJson add_meshopt_primitive(const MeshoptPrimitive& primitive, const PositionFrame& frame, int normal_bits,
+                               const UvGrid& uvs, MeshoptStreams& streams);
+
+} // namespace packtrace

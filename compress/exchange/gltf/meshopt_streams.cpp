@@ -1,0 +1,71 @@
+#include "compress/exchange/gltf/meshopt_streams.h"
+
+#include <cstring>
+#include <limits>
+
+#include <meshoptimizer.h>
+
+namespace packtrace {
+
+MeshoptStreams::Stream& MeshoptStreams::stream(const Format& format) {
+  const auto [place, added] = streams_.try_emplace(format);
+  if (added) place->second.view = model_.reserve_view();
+  return place->second;
+}
+
+int MeshoptStreams::add(const Format& format, std::span<const std::byte> bytes, GltfJson accessor) {
+  Stream& to = stream(format);
+  accessor["bufferView"] = to.view;
+  if (!to.bytes.empty()) accessor["byteOffset"] = to.bytes.size();
+  accessor["count"] = bytes.size() / format.stride;
+  to.bytes.insert(to.bytes.end(), bytes.begin(), bytes.end());
+  return model_.add("accessors", std::move(accessor));
+}
+
+int MeshoptStreams::add_indices(const std::vector<uint32_t>& indices, size_t vertices) {
+  const bool small = vertices <= std::numeric_limits<uint16_t>::max(); // 65535 restarts strips in some viewers
+  const uint32_t stride = small ? 2 : 4;
+  Stream& to = stream({stride, kGltfIndices, {}});
+  GltfJson accessor{{"bufferView", to.view},
+                    {"componentType", small ? kGltfUnsignedShort : kGltfUnsignedInt},
+                    {"count", indices.size()},
+                    {"type", "SCALAR"}};
+  if (!to.indices.empty()) accessor["byteOffset"] = to.indices.size() * stride;
+  to.indices.insert(to.indices.end(), indices.begin(), indices.end());
+  return model_.add("accessors", std::move(accessor));
+}
+
+uint64_t MeshoptStreams::finish() {
+  uint64_t total = 0;
+  meshopt_encodeIndexVersion(1); // the only version of the extension
+  meshopt_encodeVertexVersion(0);
+  for (auto& [format, stream] : streams_) {
+    const bool is_indices = format.target == kGltfIndices;
+    const size_t count = is_indices ? stream.indices.size() : stream.bytes.size() / format.stride;
+    std::vector<std::byte> coded(is_indices
+                                     ? meshopt_encodeIndexBufferBound(count, std::numeric_limits<uint32_t>::max())
+                                     : meshopt_encodeVertexBufferBound(count, format.stride));
+    auto* const to = reinterpret_cast<unsigned char*>(coded.data());
+    const size_t bytes = is_indices
+                             ? meshopt_encodeIndexBuffer(to, coded.size(), stream.indices.data(), count)
+                             : meshopt_encodeVertexBuffer(to, coded.size(), stream.bytes.data(), count, format.stride);
+    coded.resize(bytes);
+    model_.fill_compressed_view(stream.view, coded, format.target,
+                                {is_indices ? "TRIANGLES" : "ATTRIBUTES", format.filter, format.stride, count});
+    total += bytes;
+    stream = {};
+  }
+  streams_.clear();
+  return total;
+}
+
+std::vector<std::byte> exponential(std::span<const int64_t> mantissas, int exponent) {
+  std::vector<std::byte> bytes(mantissas.size() * sizeof(uint32_t));
+  for (size_t i = 0; i < mantissas.size(); ++i) {
+    const uint32_t word = (static_cast<uint32_t>(exponent) << 24) | (static_cast<uint32_t>(mantissas[i]) & 0xffffffu);
+    std::memcpy(bytes.data() + i * sizeof word, &word, sizeof word);
+  }
+  return bytes;
+}
+
+} // namespace packtrace

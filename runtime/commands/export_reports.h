@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "compress/exchange/gltf/gltf_export.h"
+#include "compress/exchange/vertex16/vertex16_export.h"
+
+namespace packtrace {
+
+/// What reports of an export say of its files and settings.
+struct ExportNames {
+  std::string input, output;
+  std::string profile, codec; ///< of glTF
+};
+
+nlohmann::json to_json(const ExportNames& names, const Vertex16Report& report);
+std::string to_text(const ExportNames& names, const Vertex16Report& report);
+nlohmann::json to_json(const ExportNames& names, const GltfReport& report);
+std::string to_text(const ExportNames& names, const GltfReport& report);
+
+} // namespace packtrace

@@ -1,0 +1,255 @@
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/import_scene.h"
+#include "tests/compress/gltf_test_support.h"
+#include "tests/compress/test_scenes.h"
+#include "tests/temporary_folder.h"
+
+namespace packtrace {
+namespace {
+
+using namespace gltf_test;
+
+Scene scene_with_images() {
+  Scene scene = test::mixed_scene();
+  AlbedoTexture texture;
+  texture.width = 40, texture.height = 24;
+  for (uint32_t i = 0; i < texture.width * texture.height; ++i) {
+    texture.rgb.push_back(static_cast<uint8_t>(i % 40 * 6));
+    texture.rgb.push_back(static_cast<uint8_t>(i / 40 * 10));
+    texture.rgb.push_back(90);
+  }
+  texture.uv_scale = {2.0f, 3.0f};
+  scene.textures.push_back(std::move(texture));
+  scene.materials.front().albedo_texture = 0;
+  scene.materials.front().flags |= kAlbedoTexture;
+  return scene;
+}
+
+BakedScene bake_for_shading(const Scene& scene) {
+  BakeConfig config;
+  config.purpose = baked::kShading;
+  config.textures = true;
+  return test::bake(scene, config);
+}
+
+void write(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+/// Imports a glTF file and bakes it with default settings.
+BakedScene bake_again(const std::filesystem::path& path) {
+  ImportOptions options;
+  options.keep_textures = true;
+  Diagnostics diagnostics;
+  Progress progress;
+  const ImportResult result = import_scene(path, options, diagnostics, progress);
+  EXPECT_TRUE(diagnostics.entries().empty()) << diagnostics.entries().front().message;
+  return bake_for_shading(result.scene);
+}
+
+using WorldFace = std::array<std::array<float, 3>, 3>;
+
+/// Faces of all instances in world space.
+std::multiset<WorldFace> world_faces(const BakedFile& file) {
+  std::multiset<WorldFace> faces;
+  for (uint32_t i = 0; i < file.instances().size(); ++i) {
+    const test::Decoded decoded = test::decode(file, file.instances()[i].geometry);
+    const DAffine map(file.world_from_object(i));
+    for (const Triangle& t : decoded.triangles) {
+      WorldFace face;
+      for (int k = 0; k < 3; ++k) {
+        const DVec3 p = transform_point(map, DVec3(decoded.positions[t[k]]));
+        for (int axis = 0; axis < 3; ++axis)
+          face[static_cast<size_t>(k)][static_cast<size_t>(axis)] = static_cast<float>(p[axis]) + 0.0f;
+      }
+      faces.insert(test::face_of(face));
+    }
+  }
+  return faces;
+}
+
+double largest_step(const BakedFile& file) {
+  double step = 0.0;
+  for (uint32_t i = 0; i < file.instances().size(); ++i) {
+    const baked::GeometryRecord& g = file.geometries()[file.instances()[i].geometry];
+    const Affine map = file.world_from_object(i);
+    const double scale = double{glm::length(map[0])} + double{glm::length(map[1])} + double{glm::length(map[2])};
+    step = std::max(step, PositionGrid{g.step_mantissa, g.step_exponent}.step() * scale);
+  }
+  return step;
+}
+
+class GltfProfiles : public testing::TestWithParam<GltfProfile> {
+protected:
+  TemporaryFolder folder_;
+};
+INSTANTIATE_TEST_SUITE_P(All, GltfProfiles,
+                         testing::Values(GltfProfile::kPortable, GltfProfile::kWeb, GltfProfile::kExchange));
+
+TEST_P(GltfProfiles, FilesComeBack) {
+  const BakedScene baked = bake_for_shading(scene_with_images());
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  write(folder_ / "a.glb", export_of(file, gltf_profile(GetParam())).bytes);
+  const BakedScene again = bake_again(folder_ / "a.glb");
+  const BakedFile back = BakedFile::from_bytes(again.bytes);
+  const std::multiset<WorldFace> before = world_faces(file), after = world_faces(back);
+  ASSERT_EQ(before.size(), after.size());
+  const double tolerance = largest_step(file);
+  // Faces are sorted by their smallest corner; both sets have one order up to the tolerance along x.
+  std::set<std::array<float, 3>> corners;
+  for (const WorldFace& face : after) corners.insert(face.begin(), face.end());
+  for (const WorldFace& face : before)
+    for (const std::array<float, 3>& p : face) {
+      double nearest = std::numeric_limits<double>::infinity();
+      const auto reach = static_cast<float>(tolerance);
+      for (auto q = corners.lower_bound({p[0] - reach, -1e30f, -1e30f}); q != corners.end() && (*q)[0] <= p[0] + reach;
+           ++q)
+        nearest = std::min(nearest, std::hypot(double{(*q)[0] - p[0]}, double{(*q)[1] - p[1]}, double{(*q)[2] - p[2]}));
+      ASSERT_LE(nearest, tolerance);
+    }
+  const TextureView a = file.texture(0);
+  std::optional<TextureView> found; // the mask's image is another texture
+  for (uint32_t i = 0; i < back.sections().textures.size(); ++i)
+    if (back.texture(i).width == a.width) found = back.texture(i);
+  ASSERT_TRUE(found);
+  for (uint32_t y = 0; y < a.height; ++y)
+    for (uint32_t x = 0; x < a.width; ++x)
+      for (size_t c = 0; c < 3; ++c) ASSERT_NEAR(a.texel(x, y)[c], found->texel(x, y)[c], 24) << x << " " << y;
+}
+
+TEST_P(GltfProfiles, BytesDoNotDependOnThreads) {
+  const BakedScene baked = bake_for_shading(scene_with_images());
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const GltfExport many = export_of(file, gltf_profile(GetParam()));
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(export_of(file, gltf_profile(GetParam())).bytes, many.bytes);
+}
+
+TEST_P(GltfProfiles, TextAndBufferHoldTheSame) {
+  const BakedScene baked = bake_for_shading(scene_with_images());
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  GltfConfig config = gltf_profile(GetParam());
+  write(folder_ / "a.glb", export_of(file, config).bytes);
+  config.buffer_name = "a b.bin";
+  const GltfExport apart = export_of(file, config);
+  write(folder_ / "a.gltf", apart.bytes);
+  write(folder_ / "a b.bin", apart.buffer);
+  EXPECT_EQ(world_faces(BakedFile::from_bytes(bake_again(folder_ / "a.gltf").bytes)),
+            world_faces(BakedFile::from_bytes(bake_again(folder_ / "a.glb").bytes)));
+}
+
+/// The lattice survives, though it is not the one that baking would choose: positions are equal bit for bit.
+TEST(GltfRoundTrip, LatticesAreEqual) {
+  BakeConfig coarse;
+  coarse.precision_kind = PrecisionKind::kPositionBits;
+  coarse.precision = 11;
+  const BakedScene baked = test::bake(scene_with_images(), coarse);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const TemporaryFolder folder;
+  for (const GltfProfile profile : {GltfProfile::kPortable, GltfProfile::kExchange}) {
+    write(folder / "a.glb", export_of(file, gltf_profile(profile)).bytes);
+    const BakedScene again = bake_again(folder / "a.glb");
+    const BakedFile back = BakedFile::from_bytes(again.bytes);
+    EXPECT_EQ(world_faces(back), world_faces(file));
+    std::set<double> before, after;
+    for (uint32_t g = 0; g < file.base_geometry_count(); ++g)
+      before.insert(PositionGrid{file.geometries()[g].step_mantissa, file.geometries()[g].step_exponent}.step());
+    for (uint32_t g = 0; g < back.base_geometry_count(); ++g)
+      after.insert(PositionGrid{back.geometries()[g].step_mantissa, back.geometries()[g].step_exponent}.step());
+    EXPECT_EQ(before, after);
+  }
+}
+
+TEST(GltfPortable, UsesNoExtension) {
+  Scene scene = scene_with_images();
+  scene.materials.front().flags |= kTransmissive;
+  const BakedScene baked = bake_for_shading(scene);
+  const tinygltf::Model model =
+      parse(export_of(BakedFile::from_bytes(baked.bytes), gltf_profile(GltfProfile::kPortable)));
+  EXPECT_TRUE(model.extensionsUsed.empty());
+  EXPECT_TRUE(model.extensionsRequired.empty());
+  EXPECT_TRUE(std::ranges::any_of(model.materials, [](const auto& m) { return m.alphaMode == "BLEND"; }));
+  for (const tinygltf::Material& material : model.materials)
+    EXPECT_TRUE(material.pbrMetallicRoughness.baseColorTexture.extensions.empty());
+}
+
+TEST(GltfWeb, StatesItsErrors) {
+  const BakedScene baked = bake_for_shading(scene_with_images());
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  GltfConfig config = gltf_profile(GltfProfile::kWeb);
+  const GltfReport bytes = export_of(file, config).report;
+  EXPECT_GT(bytes.max_normal_error_degrees, 0.1);
+  EXPECT_LT(bytes.max_normal_error_degrees, 1.5);
+  EXPECT_GE(bytes.min_texture_psnr, 40.0);
+  EXPECT_LE(bytes.max_placement_error, largest_step(file));
+  config.meshopt_normal_bits = 12;
+  EXPECT_LT(export_of(file, config).report.max_normal_error_degrees, 0.1);
+}
+
+TEST(GltfWeb, MergesWhatHasOneMaterial) {
+  Scene scene = test::scene_of(test::grid_mesh(8));
+  for (int i = 1; i < 6; ++i)
+    test::add_shape(scene, test::grid_mesh(8 + static_cast<uint32_t>(i)), test::translation({2.0 * i, 0, 0}));
+  const BakedScene baked = test::bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(file.geometries().size(), 6u);
+  EXPECT_EQ(export_of(file, gltf_profile(GltfProfile::kWeb)).report.meshes, 1u);
+  EXPECT_EQ(export_of(file, gltf_profile(GltfProfile::kExchange)).report.meshes, 6u);
+}
+
+TEST(GltfLevels, CoverageFallsWithTheLevels) {
+  const Scene scene = test::scene_of(test::sphere_mesh(40));
+  BakeConfig bake;
+  bake.lod = LodUse::kAll;
+  const BakedScene baked = test::bake(scene, bake);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const size_t levels = file.lod(0).levels.size();
+  ASSERT_GT(levels, 2u);
+  GltfConfig config = plain();
+  config.levels = true;
+  const GltfExport result = export_of(file, config);
+  EXPECT_EQ(result.report.levels, levels - 1);
+  const tinygltf::Model model = parse(result);
+  const auto node = std::ranges::find_if(model.nodes, [](const auto& n) { return n.extensions.count("MSFT_lod") > 0; });
+  ASSERT_NE(node, model.nodes.end());
+  EXPECT_EQ(node->extensions.at("MSFT_lod").Get("ids").ArrayLen(), levels - 1);
+  const tinygltf::Value& coverage = node->extras.Get("MSFT_screencoverage");
+  ASSERT_EQ(coverage.ArrayLen(), levels);
+  const Bounds box = object_bounds(file.geometries()[0]);
+  for (size_t i = 0; i + 1 < levels; ++i) {
+    const double error = double{file.lod(0).levels[i + 1].error};
+    EXPECT_DOUBLE_EQ(coverage.Get(static_cast<int>(i)).GetNumberAsDouble(),
+                     std::min(1.0, box.diagonal() / (error * 1080.0)));
+    EXPECT_GE(coverage.Get(static_cast<int>(i)).GetNumberAsDouble(),
+              coverage.Get(static_cast<int>(i + 1)).GetNumberAsDouble());
+  }
+}
+
+TEST(GltfExport, BrokenNamesAreWrittenAsUtf8) {
+  Scene scene = test::scene_of(test::grid_mesh(4));
+  scene.materials[0].name = "b\xe4um \xff\xc3 \xed\xa0\x80";
+  scene.meshes[0].name = "\xe9\x80\x00t\xc3"; // Latin-1, then a truncated character
+  Camera camera;
+  camera.film_name = "\xfc.exr";
+  scene.cameras.push_back(camera);
+  const BakedScene baked = test::bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  for (const GltfProfile profile : {GltfProfile::kPortable, GltfProfile::kExchange}) {
+    const tinygltf::Model model = parse(export_of(file, gltf_profile(profile)));
+    EXPECT_TRUE(model.materials[0].name.starts_with("b\u00e4um \u00ff")) << model.materials[0].name;
+    EXPECT_EQ(model.cameras[0].name, "\u00fc.exr");
+  }
+}
+
+} // namespace
+} // namespace packtrace
