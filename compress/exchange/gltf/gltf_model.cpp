@@ -1,6 +1,7 @@
 #include "compress/exchange/gltf/gltf_model.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
