@@ -1,22 +1,18 @@
 #include "runtime/gpu/gpu_scene.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstring>
-#include <mutex>
 
-#include "runtime/gpu/device/buffer.h"
-#include "runtime/gpu/device/kernel.h"
+#include "runtime/gpu/gpu_scene_state.h"
 #include "runtime/gpu/shaders/spirv.h"
 
 namespace packtrace::gpu {
 namespace {
 
-constexpr uint32_t kSceneBindings = 9, kRaysBinding = 9, kResultsBinding = 10, kBindings = 11;
+constexpr uint32_t kRaysBinding = kSceneBindings, kResultsBinding = kSceneBindings + 1, kBindings = kSceneBindings + 2;
 constexpr uint32_t kGroupSize = 64;
 constexpr uint32_t kMaxRays = 65535 * kGroupSize; ///< of a dispatch
-constexpr uint32_t kFirstRays = 8192;             ///< of the first dispatch, whose speed is not known
 constexpr uint64_t kPayloadPadding = 16;          ///< kernels read three words from a field's first on
 
 template <typename T>
@@ -47,31 +43,6 @@ uint32_t next_rays(uint32_t last, double last_ms, double wanted_ms) {
 
 } // namespace
 
-struct GpuScene::State {
-  std::shared_ptr<Device> device;
-  bool exact = false;
-  Buffer nodes, clusters, payload, placements, top_nodes, trees, exact_vertices, masks, scene;
-  std::unique_ptr<Kernel> closest, any;
-  uint32_t top_levels = 0;
-  // Of the queries, under the mutex:
-  std::mutex mutex;
-  Buffer rays, results;
-  uint32_t rays_at_once[2] = {kFirstRays, kFirstRays};
-
-  void upload_all(const SceneTables& t);
-  void upload_placements(const SceneTables& t);
-  void make_kernels(const SceneTables& t);
-  std::unique_ptr<Kernel> make_kernel(std::span<const uint32_t> spirv, std::span<const uint32_t> constants) const;
-  void bind_scene(Kernel& kernel) const;
-  std::array<const Buffer*, kSceneBindings> scene_buffers() const {
-    return {&nodes, &clusters, &payload, &placements, &top_nodes, &trees, &exact_vertices, &masks, &scene};
-  }
-  void make_room(uint64_t ray_count, uint64_t result_bytes);
-  template <typename Take>
-  void trace(Kernel& kernel, uint32_t& at_once, std::span<const packed::KernelRay> all, uint32_t ray_class,
-             uint32_t result_bytes, const Take& take);
-};
-
 void GpuScene::State::upload_all(const SceneTables& t) {
   nodes = upload_span(device, t.nodes, "nodes");
   clusters = upload_span(device, t.clusters, "clusters");
@@ -88,6 +59,7 @@ void GpuScene::State::upload_placements(const SceneTables& t) {
   placements = upload_span(device, std::span<const packed::TracePlacement>(all), "placements");
   top_nodes = upload_span(device, t.top_nodes, "the tree over placements");
   scene = upload_span(device, std::span<const SceneRecord>(&t.scene, 1), "the scene's record");
+  ++placed;
 }
 
 void GpuScene::State::make_kernels(const SceneTables& t) {
@@ -96,22 +68,23 @@ void GpuScene::State::make_kernels(const SceneTables& t) {
   };
   top_levels = levels_of(t.top_nodes);
   const DeviceTraits& traits = device->traits();
-  const uint32_t constants[] = {exact ? 1u : 0u,
-                                traits.fused_doubles ? 1u : 0u,
-                                top_levels + t.tree_levels + 1,
-                                t.top_nodes.empty() ? 0u : 1u,
-                                any_tree(kFineTree | kInexactDifferences),
-                                any_tree(kGraded),
-                                t.masks.empty() ? 0u : 1u,
-                                t.exact_vertices.empty() ? 0u : 1u,
-                                traits.half_bytes ? 1u : 0u};
-  closest = make_kernel(spirv::trace_closest(), constants);
-  any = make_kernel(spirv::trace_any(), constants);
+  constants = {exact ? 1u : 0u,
+               traits.fused_doubles ? 1u : 0u,
+               top_levels + t.tree_levels + 1,
+               t.top_nodes.empty() ? 0u : 1u,
+               any_tree(kFineTree | kInexactDifferences),
+               any_tree(kGraded),
+               t.masks.empty() ? 0u : 1u,
+               t.exact_vertices.empty() ? 0u : 1u,
+               traits.half_bytes ? 1u : 0u,
+               traits.subgroup_size >= 16 ? 4u : 8u};
+  closest = make_kernel(spirv::trace_closest(), kBindings, sizeof(SpanRecord));
+  any = make_kernel(spirv::trace_any(), kBindings, sizeof(SpanRecord));
 }
 
-std::unique_ptr<Kernel> GpuScene::State::make_kernel(std::span<const uint32_t> spirv,
-                                                     std::span<const uint32_t> constants) const {
-  auto kernel = std::make_unique<Kernel>(device, spirv, constants, kBindings, uint32_t{sizeof(SpanRecord)});
+std::unique_ptr<Kernel> GpuScene::State::make_kernel(std::span<const uint32_t> spirv, uint32_t bindings,
+                                                     size_t push_bytes) const {
+  auto kernel = std::make_unique<Kernel>(device, spirv, constants, bindings, static_cast<uint32_t>(push_bytes));
   bind_scene(*kernel);
   return kernel;
 }
@@ -119,6 +92,17 @@ std::unique_ptr<Kernel> GpuScene::State::make_kernel(std::span<const uint32_t> s
 void GpuScene::State::bind_scene(Kernel& kernel) const {
   const auto all = scene_buffers();
   for (uint32_t i = 0; i < kSceneBindings; ++i) kernel.bind(i, *all[i]);
+}
+
+/// Fills in what the queue kernel reads of leaf nodes.
+void GpuScene::State::prepare_nodes(size_t count) {
+  const std::unique_ptr<Kernel> kernel = make_kernel(spirv::prepare(), kSceneBindings, sizeof(SpanRecord));
+  for (size_t first = 0; first < count; first += kMaxRays) {
+    const SpanRecord span{static_cast<uint32_t>(first),
+                          static_cast<uint32_t>(std::min<size_t>(count - first, kMaxRays)), 0, 0};
+    device->run(*kernel, std::as_bytes(std::span(&span, 1)), (span.count + kGroupSize - 1) / kGroupSize);
+  }
+  node_count = count;
 }
 
 /// Makes room for a dispatch's rays and results, for both kernels.
@@ -160,6 +144,7 @@ GpuScene::GpuScene(const GpuConfig& config, const SceneTables& tables) : state_(
   state_->exact = config.arithmetic == GpuArithmetic::kExact || !state_->device->traits().fused_floats;
   state_->upload_all(tables);
   state_->make_kernels(tables);
+  state_->prepare_nodes(tables.nodes.size());
 }
 
 GpuScene::~GpuScene() = default;
@@ -192,6 +177,7 @@ void GpuScene::any(std::span<const packed::KernelRay> rays, uint32_t ray_class, 
 }
 
 std::string GpuScene::device_name() const { return state_->device->name(); }
+uint32_t GpuScene::subgroup_size() const { return state_->device->traits().subgroup_size; }
 bool GpuScene::emulates_floats() const { return state_->exact; }
 
 uint64_t GpuScene::bytes() const {

@@ -45,6 +45,8 @@ public:
   void any(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<uint8_t> occluded) const;
 
   std::string device_name() const;
+  /// Lanes of a subgroup.
+  uint32_t subgroup_size() const;
   /// Whether float operations are emulated by doubles.
   bool emulates_floats() const;
   /// Memory on the device that stays allocated.
@@ -52,8 +54,11 @@ public:
   std::vector<std::string> validation_messages() const;
   bool validates() const;
 
-private:
   struct State;
+  /// For kernels beside those of spans of rays.
+  State& state() const { return *state_; }
+
+private:
   std::unique_ptr<State> state_;
 };
 

@@ -51,6 +51,10 @@ void write_constants(std::ostream& out) {
   write(out, "kGraded", kGraded);
   write(out, "kInexactDifferences", kInexactDifferences);
   write(out, "kFineTree", kFineTree);
+  write(out, "kNoPoint", kNoPoint);
+  write(out, "kNetOrder", kNetOrder);
+  write(out, "kDirectionOrder", kDirectionOrder);
+  write(out, "kRandomOrder", kRandomOrder);
 }
 
 } // namespace

@@ -50,6 +50,40 @@ struct SpanRecord {
   uint32_t reserved;
 };
 
+/// A perspective camera: the direction through the centre of pixel (x, y) is corner + x right + y down, in unit space.
+struct CameraRecord {
+  double eye[3], corner[3], right[3], down[3];
+  uint32_t width, height;
+};
+
+/// A surface point from which occlusion rays start, in unit space.
+struct PointRecord {
+  float origin[3]; ///< lifted off the surface
+  float up[3];     ///< geometric normal, unit length
+  float normal[3]; ///< shading normal, unit length
+  uint32_t pixel;  ///< kNoPoint: nothing to trace
+  uint32_t x_px, y_px;
+};
+inline constexpr uint32_t kNoPoint = ~0u;
+
+/// A part of the points and samples of a picture.
+struct OcclusionRecord {
+  uint32_t first_point, point_count;
+  uint32_t first_sample, sample_count; ///< numbers in the pixels' sequences
+  uint32_t per_thread;                 ///< samples
+  uint32_t idle_lanes;                 ///< a subgroup starts rays once so many lanes have none
+  uint32_t order;                      ///< OcclusionOrder
+  uint32_t seed;                       ///< of the sampler
+  float tfar;
+  // Nearest hits: VisibilityCurve, and radii per length of unit space.
+  float inverse_radius, lambda, darkening, end, floor, scale, parabola;
+};
+
+/// Which sample points a pixel gets, and in which order.
+inline constexpr uint32_t kNetOrder = 0;       ///< SamplerKind::kSpaceTimeNet, by number
+inline constexpr uint32_t kDirectionOrder = 1; ///< 256 strata along a curve: neighbouring pixels shoot in one direction
+inline constexpr uint32_t kRandomOrder = 2;    ///< the same strata, in an order of the pixel's own
+
 /// In the mask buffer: a cluster whose triangles need a mask lookup. Its texture coordinates follow, two floats a
 /// vertex, if has_uvs is not 0.
 struct MaskedCluster {

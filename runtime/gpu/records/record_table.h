@@ -103,6 +103,43 @@ inline constexpr std::array kSpanFields = {
     GlslField{"uint", "reserved", offsetof(SpanRecord, reserved)},
 };
 
+inline constexpr std::array kCameraFields = {
+    GlslField{"double", "eye", offsetof(CameraRecord, eye), 3},
+    GlslField{"double", "corner", offsetof(CameraRecord, corner), 3},
+    GlslField{"double", "right", offsetof(CameraRecord, right), 3},
+    GlslField{"double", "down", offsetof(CameraRecord, down), 3},
+    GlslField{"uint", "width", offsetof(CameraRecord, width)},
+    GlslField{"uint", "height", offsetof(CameraRecord, height)},
+};
+
+inline constexpr std::array kPointFields = {
+    GlslField{"float", "origin", offsetof(PointRecord, origin), 3},
+    GlslField{"float", "up", offsetof(PointRecord, up), 3},
+    GlslField{"float", "normal", offsetof(PointRecord, normal), 3},
+    GlslField{"uint", "pixel", offsetof(PointRecord, pixel)},
+    GlslField{"uint", "x_px", offsetof(PointRecord, x_px)},
+    GlslField{"uint", "y_px", offsetof(PointRecord, y_px)},
+};
+
+inline constexpr std::array kOcclusionFields = {
+    GlslField{"uint", "first_point", offsetof(OcclusionRecord, first_point)},
+    GlslField{"uint", "point_count", offsetof(OcclusionRecord, point_count)},
+    GlslField{"uint", "first_sample", offsetof(OcclusionRecord, first_sample)},
+    GlslField{"uint", "sample_count", offsetof(OcclusionRecord, sample_count)},
+    GlslField{"uint", "per_thread", offsetof(OcclusionRecord, per_thread)},
+    GlslField{"uint", "idle_lanes", offsetof(OcclusionRecord, idle_lanes)},
+    GlslField{"uint", "order", offsetof(OcclusionRecord, order)},
+    GlslField{"uint", "seed", offsetof(OcclusionRecord, seed)},
+    GlslField{"float", "tfar", offsetof(OcclusionRecord, tfar)},
+    GlslField{"float", "inverse_radius", offsetof(OcclusionRecord, inverse_radius)},
+    GlslField{"float", "lambda", offsetof(OcclusionRecord, lambda)},
+    GlslField{"float", "darkening", offsetof(OcclusionRecord, darkening)},
+    GlslField{"float", "end", offsetof(OcclusionRecord, end)},
+    GlslField{"float", "floor_", offsetof(OcclusionRecord, floor)},
+    GlslField{"float", "scale", offsetof(OcclusionRecord, scale)},
+    GlslField{"float", "parabola", offsetof(OcclusionRecord, parabola)},
+};
+
 inline constexpr std::array kRecords = {
     GlslRecord{"PlacementRecord", sizeof(packed::TracePlacement), kPlacementFields},
     GlslRecord{"TopNode", sizeof(packed::TopNode), kTopNodeFields},
@@ -112,6 +149,9 @@ inline constexpr std::array kRecords = {
     GlslRecord{"TreeRecord", sizeof(TreeRecord), kTreeFields},
     GlslRecord{"SceneRecord", sizeof(SceneRecord), kSceneFields},
     GlslRecord{"SpanRecord", sizeof(SpanRecord), kSpanFields},
+    GlslRecord{"CameraRecord", sizeof(CameraRecord), kCameraFields},
+    GlslRecord{"PointRecord", sizeof(PointRecord), kPointFields},
+    GlslRecord{"OcclusionRecord", sizeof(OcclusionRecord), kOcclusionFields},
 };
 
 constexpr bool same_layouts() {

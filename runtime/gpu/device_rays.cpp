@@ -1,0 +1,190 @@
+#include "runtime/gpu/device_rays.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "pbrt_import/base/error.h"
+#include "runtime/gpu/gpu_scene_state.h"
+#include "runtime/gpu/shaders/spirv.h"
+
+namespace packtrace::gpu {
+namespace {
+
+constexpr uint32_t kThreads = 64; ///< of a workgroup
+constexpr uint32_t kMaxLanes = 32, kMaxQueueNodes = 1u << 24;
+constexpr uint32_t kFirstBinding = kSceneBindings;
+
+uint32_t groups_of(uint64_t threads) { return static_cast<uint32_t>((threads + kThreads - 1) / kThreads); }
+
+uint32_t blocks_of(const CameraRecord& camera) { return (camera.width + 7) / 8 * ((camera.height + 3) / 4); }
+
+/// Runs work items in dispatches that take about the wanted time.
+class TimedDispatches {
+public:
+  /// @param rays of the first dispatch; set to what the last one's time suggests
+  /// @param rays_per_item rays of a work item
+  TimedDispatches(Device& device, uint64_t& rays, uint64_t rays_per_item, uint64_t most_items)
+      : device_(device), rays_(rays), rays_per_item_(rays_per_item), most_(std::max(most_items, uint64_t{1})) {}
+
+  /// @param run function of the first item and the number of items that returns ms
+  template <typename Run>
+  DeviceTime all(uint64_t count, uint64_t granularity, const Run& run) {
+    DeviceTime time;
+    for (uint64_t first = 0; first < count;) {
+      const uint64_t fitting = std::min(rays_ / rays_per_item_, most_);
+      const uint64_t wanted = std::max(fitting / granularity, uint64_t{1}) * granularity;
+      const uint64_t items = std::min(count - first, wanted);
+      const double ms = run(first, items);
+      first += items;
+      time.ms += ms, ++time.dispatches;
+      time.longest_ms = std::max(time.longest_ms, ms);
+      if (items == wanted || ms > device_.config().dispatch_ms) {
+        const double factor = std::clamp(device_.config().dispatch_ms / std::max(ms, 1e-3), 0.25, 4.0);
+        rays_ = std::max(static_cast<uint64_t>(factor * static_cast<double>(items * rays_per_item_)), uint64_t{1});
+      }
+    }
+    return time;
+  }
+
+private:
+  Device& device_;
+  uint64_t& rays_;
+  uint64_t rays_per_item_, most_;
+};
+
+template <typename Record>
+std::span<const std::byte> push_bytes(const Record& record) {
+  return std::as_bytes(std::span(&record, 1));
+}
+
+} // namespace
+
+struct DeviceRays::State {
+  explicit State(GpuScene::State& on_device) : scene(on_device), device(on_device.device) {}
+
+  GpuScene::State& scene;
+  std::shared_ptr<Device> device;
+  CameraRecord camera{};
+  Buffer cameras, hits, rays, points, counts;
+  uint32_t point_count = 0;
+  std::unique_ptr<Kernel> camera_kernel, points_kernel, rays_kernel, queue_kernel;
+  uint64_t placed = 0;                                    ///< GpuScene::State::placed of the kernels
+  uint64_t camera_rays = 1u << 14, queue_rays = 1u << 14; ///< of the next dispatch
+
+  void make_room(Buffer& buffer, uint64_t bytes, const char* what) {
+    if (buffer.bytes() >= bytes) return;
+    buffer = Buffer();
+    buffer = Buffer(device, bytes, BufferPlace::kDevice, what);
+  }
+  uint64_t most_threads() const { return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * kThreads; }
+  void make_queue_kernel();
+  /// Drops kernels that were made for other placements.
+  void follow_scene() {
+    if (std::exchange(placed, scene.placed) == scene.placed) return;
+    camera_kernel.reset(), points_kernel.reset(), rays_kernel.reset(), queue_kernel.reset();
+  }
+};
+
+DeviceRays::DeviceRays(const GpuScene& scene) : state_(std::make_unique<State>(scene.state())) {}
+DeviceRays::~DeviceRays() = default;
+
+DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) {
+  State& s = *state_;
+  s.follow_scene();
+  s.camera = camera;
+  const uint64_t pixels = uint64_t{camera.width} * camera.height;
+  s.make_room(s.hits, pixels * sizeof(packed::KernelHit), "hits");
+  s.make_room(s.rays, keep_rays ? pixels * sizeof(packed::KernelRay) : 1, "rays");
+  s.cameras = upload(s.device, push_bytes(camera), "the camera");
+  if (!s.camera_kernel) s.camera_kernel = s.scene.make_kernel(spirv::camera(), kFirstBinding + 3, sizeof(SpanRecord));
+  const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
+  for (uint32_t i = 0; i < std::size(buffers); ++i) s.camera_kernel->bind(kFirstBinding + i, *buffers[i]);
+  TimedDispatches dispatches(*s.device, s.camera_rays, 1, s.most_threads());
+  return dispatches.all(uint64_t{blocks_of(camera)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
+    const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), baked::kVisibleToCamera,
+                          keep_rays ? 1u : 0u};
+    return s.device->run(*s.camera_kernel, push_bytes(span), groups_of(count));
+  });
+}
+
+void DeviceRays::make_points(float lift) {
+  State& s = *state_;
+  s.follow_scene();
+  s.point_count = blocks_of(s.camera) * 32;
+  s.make_room(s.points, uint64_t{s.point_count} * sizeof(PointRecord), "points");
+  if (!s.points_kernel)
+    s.points_kernel = s.scene.make_kernel(spirv::surface_points(), kFirstBinding + 4, sizeof(SpanRecord));
+  const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays, &s.points};
+  for (uint32_t i = 0; i < std::size(buffers); ++i) s.points_kernel->bind(kFirstBinding + i, *buffers[i]);
+  const SpanRecord span{0, s.point_count, 0, std::bit_cast<uint32_t>(lift)};
+  s.device->run(*s.points_kernel, push_bytes(span), groups_of(s.point_count));
+}
+
+void DeviceRays::set_points(std::span<const PointRecord> points) {
+  State& s = *state_;
+  s.point_count = static_cast<uint32_t>(points.size());
+  s.make_room(s.points, points.size_bytes(), "points");
+  update(s.device, s.points, 0, std::as_bytes(points));
+}
+
+void DeviceRays::State::make_queue_kernel() {
+  const DeviceTraits& traits = device->traits();
+  if (traits.subgroup_size > kMaxLanes || scene.node_count > kMaxQueueNodes)
+    throw Error(ErrorKind::kUnsupported,
+                "backend gpu: the queue kernel needs subgroups of at most 32 lanes and at most "
+                "2^24 nodes");
+  queue_kernel = scene.make_kernel(traits.partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue(),
+                                   kFirstBinding + 2, sizeof(OcclusionRecord));
+}
+
+DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples) {
+  State& s = *state_;
+  s.follow_scene();
+  s.make_room(s.counts, uint64_t{s.point_count} * sizeof(uint32_t), "counts");
+  s.device->fill(s.counts, 0);
+  if (!s.queue_kernel) s.make_queue_kernel();
+  s.queue_kernel->bind(kFirstBinding, s.points);
+  s.queue_kernel->bind(kFirstBinding + 1, s.counts);
+  // Items are points times threads of a point; a dispatch gets all threads of its points.
+  const uint32_t slices = (samples.sample_count + samples.per_thread - 1) / samples.per_thread;
+  TimedDispatches dispatches(*s.device, s.queue_rays, samples.sample_count, s.most_threads() / slices / 2);
+  const DeviceTime time = dispatches.all(s.point_count, 2 * kThreads, [&](uint64_t first, uint64_t count) {
+    OcclusionRecord part = samples;
+    part.first_point = static_cast<uint32_t>(first), part.point_count = static_cast<uint32_t>(count);
+    return s.device->run(*s.queue_kernel, push_bytes(part), groups_of((count + 31) / 32 * 32 * slices));
+  });
+  return time;
+}
+
+uint32_t DeviceRays::point_count() const { return state_->point_count; }
+
+void DeviceRays::hits(std::span<packed::KernelHit> out) const {
+  download(state_->device, state_->hits, 0, std::as_writable_bytes(out));
+}
+void DeviceRays::rays(std::span<packed::KernelRay> out) const {
+  download(state_->device, state_->rays, 0, std::as_writable_bytes(out));
+}
+void DeviceRays::points(std::span<PointRecord> out) const {
+  download(state_->device, state_->points, 0, std::as_writable_bytes(out));
+}
+void DeviceRays::counts(std::span<uint32_t> out) const {
+  download(state_->device, state_->counts, 0, std::as_writable_bytes(out));
+}
+
+void DeviceRays::occlusion_rays(const OcclusionRecord& samples, std::span<packed::KernelRay> out) {
+  State& s = *state_;
+  s.follow_scene();
+  Buffer rays(s.device, uint64_t{s.point_count} * sizeof(packed::KernelRay), BufferPlace::kDevice, "occlusion rays");
+  if (!s.rays_kernel)
+    s.rays_kernel = s.scene.make_kernel(spirv::occlusion_rays(), kFirstBinding + 3, sizeof(OcclusionRecord));
+  s.rays_kernel->bind(kFirstBinding, s.points);
+  s.rays_kernel->bind(kFirstBinding + 1, s.points); // not used
+  s.rays_kernel->bind(kFirstBinding + 2, rays);
+  OcclusionRecord all = samples;
+  all.first_point = 0, all.point_count = s.point_count;
+  s.device->run(*s.rays_kernel, push_bytes(all), groups_of(s.point_count));
+  download(s.device, rays, 0, std::as_writable_bytes(out));
+}
+
+} // namespace packtrace::gpu

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "runtime/gpu/gpu_scene.h"
+
+namespace packtrace::gpu {
+
+/// Device time of some dispatches, in ms.
+struct DeviceTime {
+  double ms = 0.0;
+  double longest_ms = 0.0;
+  uint32_t dispatches = 0;
+};
+
+/// Camera and occlusion rays that are made on the device and never leave it. Not for several threads at once.
+class DeviceRays {
+public:
+  /// @param scene must outlive this object
+  explicit DeviceRays(const GpuScene& scene);
+  ~DeviceRays();
+
+  /// Traces a ray through each pixel, in blocks of 8 x 4 pixels; the picture may have any size.
+  /// @param keep_rays whether rays() and make_points() will be called
+  DeviceTime trace_camera(const CameraRecord& camera, bool keep_rays);
+  /// Makes a point of each pixel that was hit, lifted off its surface by a length of unit space.
+  void make_points(float lift);
+  /// Uses other points.
+  void set_points(std::span<const PointRecord> points);
+
+  /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
+  /// Throws Error(kUnsupported) for subgroups of more than 32 lanes and for more than 2^24 nodes.
+  DeviceTime count_occluded(const OcclusionRecord& samples);
+
+  uint32_t point_count() const;
+  /// By pixel, of trace_camera().
+  void hits(std::span<packed::KernelHit> out) const;
+  void rays(std::span<packed::KernelRay> out) const;
+  /// By point.
+  void points(std::span<PointRecord> out) const;
+  void counts(std::span<uint32_t> out) const;
+  /// The rays of sample `samples.first_sample`; those of points without a surface hit nothing.
+  void occlusion_rays(const OcclusionRecord& samples, std::span<packed::KernelRay> out);
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+} // namespace packtrace::gpu

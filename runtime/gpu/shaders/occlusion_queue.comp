@@ -1,0 +1,410 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Counts the occlusion rays that hit something, for each point. Rays are made here.
+//
+// A thread walks a ray's nodes and puts the leaves it reaches into its subgroup's queue. Once that is long enough, or no
+// ray goes on, the subgroup's lanes set up a leaf each, then decode a corner each, then test a pair of ray and triangle
+// each. Shared memory limits how many subgroups are there at once, so rays and leaves stay in registers and are shuffled.
+// Subgroups have at most 32 lanes, and nodes numbers below 2^24.
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_vote : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+#ifdef PARTITIONED
+#extension GL_NV_shader_subgroup_partitioned : require
+#endif
+#include "traversal.glsl"
+#include "points.glsl"
+
+const uint kGroup = 64u, kPlaces = 2u; // threads; places of the queue per lane
+// Decoded corners per lane. A leaf has up to 48: lanes times this must be at least that.
+layout(constant_id = 9) const uint kCorners = 8u;
+
+layout(local_size_x = 64) in;
+layout(std430, binding = 10) buffer Counts { uint counts[]; };
+
+shared uint s_queue[kGroup * kPlaces];     // node << 8 | lane << 3 | slot
+shared uint s_corner[kGroup * kCorners * 3]; // floats; before there are any: which lane has a leaf
+shared uint s_hit[kGroup / 4u];            // by subgroup: bits of the rays that hit something
+
+#define S gl_SubgroupSize
+#define LANE gl_SubgroupInvocationID
+
+void sync_shared() {
+  subgroupMemoryBarrierShared();
+  subgroupBarrier();
+}
+// Number of bits up to and including the lane's.
+uint through_lane(uint mask) { return bitCount(mask & (0xffffffffu >> (31u - LANE))); }
+
+// The n-th bit that is set, from 0.
+uint nth_bit(uint mask, uint n) {
+  uint at = 0u, c = bitCount(mask & 0xffffu);
+  if (n >= c) { n -= c; at = 16u; mask >>= 16; }
+  c = bitCount(mask & 0xffu);
+  if (n >= c) { n -= c; at += 8u; mask >>= 8; }
+  c = bitCount(mask & 0xfu);
+  if (n >= c) { n -= c; at += 4u; mask >>= 4; }
+  c = bitCount(mask & 3u);
+  if (n >= c) { n -= c; at += 2u; mask >>= 2; }
+  return at + (n >= (mask & 1u) ? 1u : 0u);
+}
+
+// --- a ray's way through the scene, which may stop at any node ---
+struct Way {
+  bool in_tree;
+  uint first, group, size;  // of the tree: nodes that are left, stack entries
+  uint base;                // stack entries of the tree over placements
+  uint top_node, top_group; // of the tree over placements
+  uint placement, tree_first, tree_flags;
+};
+
+bool enter_placement(UnitRay u, uint placement, inout Way way, inout GridRay r) {
+  if ((placements[placement].classes_aligned & kOcclusionClass) == 0u) return false;
+  TreeRecord tree = trees[placements[placement].tree];
+  float pad = (kAnyGraded && (tree.flags & kGraded) != 0u ? kGradedPad : 1.0) * tree.max_coordinate;
+  way.placement = placement;
+  way.tree_first = way.first = tree.first_node;
+  way.tree_flags = tree.flags;
+  way.group = kRootGroup;
+  way.size = way.base;
+  return enter(u, placement, tree.max_coordinate, pad, kMinDirection, r);
+}
+
+// Returns whether the ray may hit something.
+bool begin_way(UnitRay u, out Way way, inout GridRay top, inout GridRay r) {
+  way = Way(false, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+  if (!kManyPlacements) {
+    way.in_tree = enter_placement(u, 0u, way, r);
+    return way.in_tree;
+  }
+  if (!enter(u, scene.placement_count, scene.top_max_coordinate, scene.top_pad_coordinate, kMinTopDirection, top))
+    return false;
+  float t[8];
+  way.top_group = pass_top_boxes(top, 0u, t);
+  return way.top_group != 0u;
+}
+
+// A step in the tree over placements. Returns false at its end.
+bool step_top(UnitRay u, GridRay top, inout Way way, inout GridRay r) {
+  if (way.top_group == 0u) {
+    if (way.base == 0u) return false;
+    --way.base;
+    way.top_node = stack[way.base].x;
+    way.top_group = stack[way.base].y;
+  }
+  uint child = top_nodes[way.top_node].child[take_slot(way.top_group)];
+  if ((child & kTopLeaf) != 0u) {
+    way.in_tree = enter_placement(u, child & ~kTopLeaf, way, r);
+  } else {
+    float t[8];
+    if (way.top_group != 0u) stack[way.base++] = uvec2(way.top_node, way.top_group);
+    way.top_node = child;
+    way.top_group = pass_top_boxes(top, child, t);
+  }
+  return true;
+}
+
+// --- leaves ---
+// What the lanes that decode a leaf's corners must know of it.
+struct Leaf { uint cluster, ranks, leads, lo, hi, turns, corner_count, triangle_count; };
+
+Leaf set_up(uint node, uint slot) {
+  Leaf e;
+  uint n0w = nodes[5u * node].w;
+  uvec4 n1 = nodes[5u * node + 1u];
+  uint shift = 8u * (slot & 3u), before0 = n1.z * 0x01010101u, before1 = n1.w * 0x01010101u;
+  uint count = ((slot < 4u ? n1.z : n1.w) >> shift) & 255u;
+  uint before = (((slot < 4u ? before0 : before1) >> shift) & 255u) + (slot < 4u ? 0u : before0 >> 24) - count;
+  uint node_first = n0w >> 24, first = node_first + before;
+  e.cluster = n1.y;
+  Cluster c = read_cluster(n1.y);
+  bool dead = count == 0u || (c.flags & kOcclusionClass) == 0u;
+  count = max(count, 1u);
+  uint tris = c.triangle_count, restarts = bits_at(c.base, first), lefts = bits_at(c.base, tris + first);
+  // prepare.comp: counting begins at the node.
+  uint node_strips = n1.x >> 16, node_corner = node_first + 2u * node_strips;
+  uint corner = first + 2u * (node_strips + count_ones(c.base, node_first, before));
+  uint rank = (n1.x & 0xffffu) + count_ones(c.base, 2u * tris + node_corner, corner - node_corner);
+  bool leading = (restarts & 1u) == 0u;
+  e.leads = 0u;
+  if (leading) {
+    uint strip = uint(last_one(c.base, 0u, first + 1u, 0u));
+    bool left = (lefts & 1u) != 0u;
+    int turn = last_one(c.base, tris + strip + 1u, first - strip, left ? 0xffffffffu : 0u);
+    uint first_corner = corner - (first - strip);
+    uint kept = turn >= 0 ? first_corner + uint(turn) : first_corner - (left ? 2u : 1u);
+    uint pair = 0u; // the second corner above the first
+    [[dont_unroll]] for (uint k = 0u; k < 2u; ++k)
+      pair = (pair << 16) | earlier_number(c, (k == 0u) == left ? corner - 1u : kept, corner, rank);
+    e.leads = pair;
+  }
+  uint bit = 2u * tris + corner, at = c.base + (bit >> 5), offset = bit & 31u;
+  uint w0 = words[at], w1 = words[at + 1u], w2 = words[at + 2u];
+  e.lo = funnel(w0, w1, offset);
+  e.hi = funnel(w1, w2, offset);
+  restarts = (restarts & ((1u << count) - 1u)) | 1u;
+  e.turns = restarts | (lefts << 16);
+  e.corner_count = count + 2u * bitCount(restarts);
+  e.ranks = rank | ((corner - rank) << 10) | (leading ? 1u << 20 : 0u);
+  e.triangle_count = dead ? 0u : count;
+  return e;
+}
+
+// Corner j of a leaf's list.
+vec3 leaf_corner(uint cluster, uint ranks, uint leads, uint lo, uint hi, uint j) {
+  Cluster c = read_cluster(cluster);
+  bool leading = (ranks & (1u << 20)) != 0u;
+  uint number;
+  if (leading && j < 2u) {
+    number = j == 0u ? leads & 0xffffu : leads >> 16;
+  } else {
+    if (leading) j -= 2u;
+    uint word = j < 32u ? lo : hi, below = word & ((1u << (j & 31u)) - 1u);
+    uint ones = bitCount(below) + (j < 32u ? 0u : bitCount(lo)), rank = ranks & 1023u, named = (ranks >> 10) & 1023u;
+    number = corner_number(c, rank + ones + named + j - ones, rank + ones, ((word >> (j & 31u)) & 1u) != 0u);
+  }
+  return position(c, number);
+}
+
+// Corners A, B, C of triangle j of a leaf whose corners begin at `base`.
+uvec3 triangle_corners(uint turns, uint base, uint j) {
+  uint restarts = turns & 0xffffu, lefts = turns >> 16, upto = (2u << j) - 1u;
+  uint through = restarts & upto, strip = uint(findMSB(through));
+  uint C = base + j + 2u * bitCount(through), A = C - 2u, B = C - 1u;
+  if (strip != j) {
+    // The corner that does not change: where the last turn the other way was made.
+    uint strip_c = C - (j - strip), after = upto & ~((2u << strip) - 1u);
+    bool left = ((lefts >> j) & 1u) != 0u;
+    uint other = (left ? ~lefts : lefts) & after;
+    uint kept = other != 0u ? strip_c + (uint(findMSB(other)) - strip) - 1u : strip_c - (left ? 2u : 1u);
+    A = left ? kept : C - 1u;
+    B = left ? C - 1u : kept;
+  }
+  return uvec3(A, B, C);
+}
+
+// --- pairs ---
+// The ray of another lane; all lanes together.
+GridRay ray_of(GridRay r, uint lane) {
+  GridRay p = r;
+  p.origin = subgroupShuffle(r.origin, lane);
+  p.begin = subgroupShuffle(r.begin, lane);
+  p.end = subgroupShuffle(r.end, lane);
+  p.shear = subgroupShuffle(r.shear, lane);
+  p.major = subgroupShuffle(r.major, lane);
+  p.rest = vec3(0.0);
+  return p;
+}
+Corner shared_corner(GridRay p, uint at) { // at: of the first float
+  uint kx = p.major, ky = kx == 2u ? 0u : kx + 1u, kz = kx == 0u ? 2u : kx - 1u;
+  return make_corner(p, vec3(uintBitsToFloat(s_corner[at + kx]), uintBitsToFloat(s_corner[at + ky]),
+                             uintBitsToFloat(s_corner[at + kz])));
+}
+
+// Tests up to S leaves of the queue from e0 on.
+void flush_leaves(GridRay r, uint tree_flags, uint e0, uint total) {
+  const uint thread0 = gl_SubgroupID * S, queue0 = thread0 * kPlaces, corner0 = thread0 * kCorners * 3u;
+  const uint capacity = S * kCorners;
+  bool have = e0 + LANE < total;
+  uint entry = have ? s_queue[queue0 + e0 + LANE] : 0xffffffffu;
+  uint key = entry & ~0xf8u, ray = (entry >> 3) & 31u;
+  // Lanes with the same leaf: it is decoded once.
+#ifdef PARTITIONED
+  uint leader = uint(findLSB(subgroupPartitionNV(key).x));
+#else
+  uint h = corner0 + ((key * 0x9e3779b1u) >> 16) % (2u * S);
+  atomicExchange(s_corner[h], LANE); // a plain store may be forwarded to the load below
+  sync_shared();
+  uint w = atomicOr(s_corner[h], 0u), leader = subgroupShuffle(key, w) == key ? w : LANE;
+  sync_shared();
+#endif
+  uint leaders = subgroupBallot(have && leader == LANE).x, leaves = bitCount(leaders);
+  uint leaf = subgroupShuffle(entry, nth_bit(leaders, min(LANE, leaves - 1u)));
+  uint mine = bitCount(leaders & ((1u << leader) - 1u));
+  Leaf e = Leaf(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+  bool leads = LANE < leaves;
+  if (leads) e = set_up(leaf >> 8, leaf & 7u);
+  uint end_m = subgroupInclusiveAdd(e.corner_count), start_m = end_m - e.corner_count;
+  uint my_turns = subgroupShuffle(e.turns, mine);
+  uint my_start = subgroupShuffle(start_m | (e.corner_count << 16) | (e.triangle_count << 24), mine);
+  uint my_n = have ? my_start >> 24 : 0u, my_end = (my_start & 0xffffu) + ((my_start >> 16) & 255u);
+  my_start &= 0xffffu;
+  uint done = 0u, at = 0u;
+  while (at < leaves) {
+    // As many leaves as there is room for corners.
+    bool lead_in = leads && LANE >= at && end_m - done <= capacity;
+    uint batch = bitCount(subgroupBallot(lead_in).x);
+    uint all_m = subgroupShuffle(end_m, at + batch - 1u) - done, from = start_m - done;
+    for (uint k0 = 0u; k0 < all_m; k0 += S) {
+      uint mark = subgroupOr(lead_in && from - k0 < S ? 1u << (from - k0) : 0u);
+      uint owner = at + bitCount(subgroupBallot(lead_in && from < k0).x) + through_lane(mark) - 1u, k = k0 + LANE;
+      uint o_cluster = subgroupShuffle(e.cluster, owner), o_ranks = subgroupShuffle(e.ranks, owner),
+           o_leads = subgroupShuffle(e.leads, owner), o_lo = subgroupShuffle(e.lo, owner),
+           o_hi = subgroupShuffle(e.hi, owner), o_from = subgroupShuffle(from, owner);
+      if (k < all_m) {
+        uvec3 v = floatBitsToUint(leaf_corner(o_cluster, o_ranks, o_leads, o_lo, o_hi, k - o_from));
+        uint q = corner0 + 3u * k;
+        s_corner[q] = v.x;
+        s_corner[q + 1u] = v.y;
+        s_corner[q + 2u] = v.z;
+      }
+    }
+    sync_shared();
+    bool in_batch = my_n != 0u && my_start >= done && my_end - done <= capacity;
+    uint n = in_batch ? my_n : 0u, end_n = subgroupInclusiveAdd(n), n_from = end_n - n;
+    uint all_n = subgroupShuffle(end_n, S - 1u), entries = subgroupBallot(in_batch).x;
+    uint e_pair = n_from | ((my_start - done) << 10) | (ray << 20), nth = LANE;
+    bool gaps = (entries & (entries + 1u)) != 0u;
+    if (gaps) nth = nth_bit(entries, LANE);
+    for (uint k0 = 0u; k0 < all_n; k0 += S) {
+      uint mark = subgroupOr(in_batch && n_from - k0 < S ? 1u << (n_from - k0) : 0u);
+      uint owner = bitCount(subgroupBallot(in_batch && n_from < k0).x) + through_lane(mark) - 1u, k = k0 + LANE;
+      if (gaps) owner = subgroupShuffle(nth, owner);
+      uint pair = subgroupShuffle(e_pair, owner), turns = subgroupShuffle(my_turns, owner), lane = (pair >> 20) & 31u;
+      GridRay p = ray_of(r, lane);
+      uint flags = kAnyFine ? subgroupShuffle(tree_flags, lane) : 0u;
+      if (k < all_n) {
+        uvec3 q = triangle_corners(turns, (pair >> 10) & 1023u, k - (pair & 1023u));
+        TriangleHit hit;
+        if (test_triangle(p, shared_corner(p, corner0 + 3u * q.x), shared_corner(p, corner0 + 3u * q.y),
+                          shared_corner(p, corner0 + 3u * q.z), flags, hit))
+          atomicOr(s_hit[gl_SubgroupID], 1u << lane);
+      }
+    }
+    sync_shared();
+    done += all_m;
+    at += batch;
+  }
+}
+
+void main() {
+  const uint room = S * kPlaces, queue0 = gl_SubgroupID * room;
+  uint item = gl_WorkGroupID.x * kGroup + gl_SubgroupID * S + LANE;
+  uint units = (push.point_count + 31u) / 32u, unit = item >> 5, slice = unit / units;
+  uint in_part = (unit % units) * 32u + (item & 31u), number = push.first_point + in_part;
+  uint slices = (push.sample_count + push.per_thread - 1u) / push.per_thread;
+  bool valid = slice < slices && in_part < push.point_count;
+  Point point = read_point(valid ? number : push.first_point);
+  valid = valid && point.pixel != kNoPoint;
+  uint s = push.first_sample + slice * push.per_thread;
+  uint end = push.first_sample + min((slice + 1u) * push.per_thread, push.sample_count);
+  uint occluded = 0u;
+  // pending: some leaf of the ray is in the queue. held: leaves of a node for which the queue had no room.
+  bool alive = valid && s < end, tracing = false, pending = false;
+  uint count = 0u, held = 0u, held_node = 0u;
+  UnitRay u;
+  GridRay r, top;
+  Way way;
+  Best best = Best(0.0, 0.0, 0xffffffffu, 0u, 0u);
+  if (LANE == 0u) s_hit[gl_SubgroupID] = 0u;
+  sync_shared();
+  for (uint guard = 0u; guard < 1000000u; ++guard) { // so that a mistake does not hang the device
+    bool ended = false, masked_hit = false, full = false;
+    // A ray each for lanes that have none, once enough have none.
+    uint idle = bitCount(subgroupBallot(alive && !tracing && !pending).x);
+    if (idle != 0u && (idle >= push.idle_lanes || !subgroupAny(tracing || pending))) {
+      if (alive && !tracing && !pending) {
+        u = unit_ray(point.origin, sample_direction(point, s), 0.0, push.tfar);
+        tracing = begin_way(u, way, top, r);
+        ended = !tracing;
+      }
+    }
+    if (!subgroupAny(tracing || pending || ended)) break;
+    bool walking;
+    do {
+      // A lane does not leave a placement while leaves of it wait: they need the ray in its grid.
+      walking = tracing && held == 0u && !(kManyPlacements && !way.in_tree && pending);
+      if (walking) {
+        if (kManyPlacements && !way.in_tree) {
+          tracing = step_top(u, top, way, r);
+          ended = ended || !tracing;
+        } else if (way.group == 0u && way.size == way.base) {
+          way.in_tree = false;
+          if (!kManyPlacements) {
+            tracing = false;
+            ended = !pending;
+          }
+        } else {
+          if (way.group == 0u) {
+            --way.size;
+            way.first = stack[way.size].x;
+            way.group = stack[way.size].y;
+          }
+          uint node = way.first + take_slot(way.group);
+          Node n = read_node(node);
+          float t[8];
+          uint mask = ((n.n0.w >> 16) & kOcclusionClass) == 0u
+                          ? 0u
+                          : pass_boxes(r, n, kAnyGraded && (way.tree_flags & kGraded) != 0u, t);
+          if (mask != 0u) {
+            if ((n.n1.z & 255u) == kInnerChild) {
+              if (way.group != 0u) stack[way.size++] = uvec2(way.first, way.group);
+              way.first = way.tree_first + n.n1.x;
+              way.group = mask;
+            } else if (kAnyMasked && ((clusters[2u * n.n1.y + 1u].z >> 8) & kMaskedCluster) != 0u) {
+              if (trace_leaves(u, r, best, way.placement, n, mask, way.tree_flags, kOcclusionClass)) {
+                tracing = false;
+                way.in_tree = false;
+                masked_hit = true;
+                if (pending) atomicOr(s_hit[gl_SubgroupID], 1u << LANE); else ended = true;
+              }
+            } else {
+              held = mask;
+              held_node = node;
+            }
+          }
+        }
+      }
+      // A leaf of each lane in turn.
+      for (uint b = subgroupBallot(held != 0u).x; b != 0u && !full;) {
+        uint to = count + through_lane(b) - 1u;
+        if (held != 0u && to < room) {
+          s_queue[queue0 + to] = (held_node << 8) | (LANE << 3) | uint(findLSB(held));
+          held &= held - 1u;
+          pending = true;
+        }
+        count = min(count + bitCount(b), room);
+        b = subgroupBallot(held != 0u).x;
+        full = count == room && b != 0u;
+      }
+      walking = tracing && held == 0u && !(kManyPlacements && !way.in_tree && pending);
+    } while (count < S && !full && subgroupAny(walking) &&
+             (push.idle_lanes >= S || bitCount(subgroupBallot(ended && s + 1u < end).x) < push.idle_lanes));
+    bool hit = masked_hit && ended;
+    if (count != 0u && (full || count >= S || !subgroupAny(walking))) {
+      sync_shared();
+      // Whole subgroups of leaves; the rest waits where rays go on.
+      uint ending = subgroupAny(walking) && count >= S ? count - count % S : count;
+      for (uint e = 0u; e < ending; e += S) flush_leaves(r, way.tree_flags, e, count);
+      uint found = s_hit[gl_SubgroupID], rest = count - ending, entry = 0u;
+      bool mine = (tracing || pending) && ((found >> LANE) & 1u) != 0u, stays = false;
+      hit = hit || mine;
+      if (LANE < rest) {
+        entry = s_queue[queue0 + ending + LANE];
+        stays = ((found >> ((entry >> 3) & 31u)) & 1u) == 0u;
+      }
+      uint staying = subgroupBallot(stays).x, waiting = subgroupOr(stays ? 1u << ((entry >> 3) & 31u) : 0u);
+      sync_shared();
+      if (stays) s_queue[queue0 + through_lane(staying) - 1u] = entry;
+      if (LANE == 0u) s_hit[gl_SubgroupID] = 0u;
+      count = bitCount(staying);
+      sync_shared();
+      bool waits = ((waiting >> LANE) & 1u) != 0u;
+      if (mine || (pending && !tracing && !waits)) {
+        ended = true;
+        tracing = false;
+        held = 0u;
+      }
+      pending = waits;
+    }
+    if (ended) {
+      occluded += hit ? 1u : 0u;
+      ++s;
+      alive = s < end;
+    }
+  }
+  if (!valid) return;
+  if (slices == 1u) counts[number] = occluded; else if (occluded != 0u) atomicAdd(counts[number], occluded);
+}
