@@ -108,7 +108,7 @@ const std::vector<Room> kRooms = {
     {"runtime/gpu/device", {"pbrt_import/base", "runtime/gpu/shaders", "runtime/gpu"}},
     {"runtime/gpu/shaders", {}},
     {"runtime/gpu/records", {"runtime/trace/packed/kernels"}},
-    {"runtime/gpu", {"runtime/gpu/device", "runtime/gpu/records", "runtime/gpu/shaders"}},
+    {"runtime/gpu", {"pbrt_import/base", "runtime/gpu/device", "runtime/gpu/records", "runtime/gpu/shaders"}},
     {"runtime/trace/gpu",
      {"pbrt_import/base", "compress/format/file", "runtime/gpu", "runtime/trace/packed/scene", "runtime/trace"}},
     {"runtime/trace/embree",
