@@ -4,7 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/commands/ao_options.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/frame/ao_names.h"
 
 namespace packtrace {
 
@@ -22,11 +24,7 @@ void add_shade_options(CLI::App& verb, ShadeOptions& options) {
       ->check(CLI::Range(-32.0f, 32.0f))
       ->type_name("STOPS")
       ->group(kGroup);
-  verb.add_option("--tone-map", options.tone_map,
-                  "Curve of shaded .png files. srgb clips at white, aces rolls highlights off (default srgb)")
-      ->check(one_of({"srgb", "aces"}))
-      ->default_str(options.tone_map)
-      ->group(kGroup);
+  add_word_option(verb, "tone-map", options.tone_map)->group(kGroup);
   verb.add_option("--shade-set", options.settings,
                   "Change a setting of shading; repeat the option for several. Names, ranges and defaults: "
                   "docs/shading.md")
@@ -39,6 +37,7 @@ void apply(const ShadeOptions& options, FrameConfig& config) {
   config.view = options.view == "pbr" ? FrameView::kPbr : options.shades() ? FrameView::kPbrAo : FrameView::kAo;
   for (const std::string& setting : options.settings)
     assign_setting(shade_settings(), setting, config.shade, "shading");
+  config.tone_map = exposure(options).curve, config.exposure = options.exposure;
   if (options.shades()) return;
   const char* const option = !options.settings.empty()    ? "--shade-set"
                              : options.exposure != 0.0f   ? "--exposure"
@@ -48,7 +47,7 @@ void apply(const ShadeOptions& options, FrameConfig& config) {
 }
 
 Exposure exposure(const ShadeOptions& options) {
-  return {options.tone_map == "aces" ? ToneMap::kAces : ToneMap::kSrgb, options.exposure};
+  return {value_of(kToneMapNames, options.tone_map, "tone-map"), options.exposure};
 }
 
 void add_shade_json(const ShadeOptions& options, const PictureReport& report, const FrameLoop& loop,

@@ -74,6 +74,7 @@ std::unique_ptr<ViewSession> start_session(const ViewOptions& options, const Glo
   Progress progress(observer ? both(display.observer(), observer) : display.observer());
   std::unique_ptr<ViewSession> session = make_session(options, globals, display, progress);
   session->keep_views(!options.profile || options.script); // picks show them
+  if (options.render.shade.shades()) session->set_layer(0, options.render.shade.view);
   display.finish();
   Progress first_frame(observer);
   find_pivot(*session, options, globals, first_frame);

@@ -82,8 +82,10 @@ std::string base_camera(const RenderOptions& options) {
 ViewFile load_view_file(const std::string& name, const RenderOptions& options, const GlobalOptions& globals,
                         const DetailConfig& detail, Progress& progress, ProgressDisplay& display) {
   // A private copy: the file may be replaced while it is shown.
+  SceneOptions scene = options.scene;
+  scene.keep_shading = true;
   const auto loaded =
-      std::make_shared<LoadedView>([&] { return load_scene(name, options.scene, globals, progress, display, true); });
+      std::make_shared<LoadedView>([&] { return load_scene(name, scene, globals, progress, display, true); });
   if (detail.error_px) require_levels(name, loaded->scene);
   const BakedFile* const baked = loaded->scene.baked ? &*loaded->scene.baked : nullptr;
   loaded->motion = baked != nullptr ? SceneMotion::of(*baked) : SceneMotion::of(*loaded->scene.imported);

@@ -58,6 +58,7 @@ void add_viewer_options(CLI::App& verb, ViewOptions& options) {
       ->group(kGroup);
   verb.add_option("--csv", options.csv, "Write a table of the frames of --profile")->type_name("FILE")->group(kGroup);
   add_quality_options(verb, options.render);
+  add_shade_options(verb, options.render.shade);
   add_tracer_options(verb, options.render);
   add_lod_options(verb, options.render.lod);
   add_scene_options(verb, options.render.scene);

@@ -16,8 +16,9 @@ void ViewOutputs::save_pane(ViewSession& session, size_t pane, const std::vector
     if (file == "-") throw Error(ErrorKind::kUsage, "pictures need a file name");
   const RenderedImage& image = session.image(pane);
   const FrameConfig& config = session.rendered_config(pane);
-  const AvailableLayers available{config.detail.camera_uses_levels(), config.denoise};
-  ImageOutputs outputs(files, {session.pane(pane).image_layer()}, available, globals_.force, {});
+  const AvailableLayers available{config.detail.camera_uses_levels(), config.denoise, true, config.shades()};
+  ImageOutputs outputs(files, {session.pane(pane).image_layer()}, available, globals_.force,
+                       {std::nullopt, true, session.pane(pane).config.display()});
   outputs.write(image, render_attributes(config, session.last().still_frames));
 }
 

@@ -13,7 +13,7 @@ namespace packtrace {
 template <typename T, size_t kCount>
 using NamedValues = std::array<std::pair<const char*, T>, kCount>;
 
-// Names of the ways to spend occlusion rays, as users give them; the first is the default.
+// Names of the ways to spend occlusion rays and to display radiance, as users give them; the first is the default.
 inline constexpr NamedValues<AoResolution, 2> kAoResolutionNames{
     {{"full", AoResolution::kFull}, {"quarter", AoResolution::kQuarter}}};
 inline constexpr NamedValues<AoRate, 3> kAoRateNames{
@@ -23,6 +23,8 @@ inline constexpr NamedValues<SamplerKind, 5> kAoSamplerNames{{{"net", SamplerKin
                                                               {"jitter", SamplerKind::kMultiJitter},
                                                               {"lattice", SamplerKind::kLattice},
                                                               {"independent", SamplerKind::kIndependent}}};
+
+inline constexpr NamedValues<ToneMap, 2> kToneMapNames{{{"srgb", ToneMap::kSrgb}, {"aces", ToneMap::kAces}}};
 
 /// Returns the value of a name. Throws Error(kUsage) for other names.
 /// @param option what the name is given for, in messages

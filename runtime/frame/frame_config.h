@@ -6,6 +6,7 @@
 #include "pbrt_import/scene/image_size.h"
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/denoise/denoiser_config.h"
+#include "runtime/image/tone_map.h"
 #include "runtime/lod/sharing_config.h"
 #include "runtime/shade/shade_config.h"
 
@@ -63,11 +64,15 @@ struct FrameConfig {
   bool cost_layers = false;    ///< fill what its camera rays visit; needs the packed tracer
   FrameView view = FrameView::kAo;
   ShadeConfig shade; ///< of the other views
+  // How shaded layers are displayed. No frame depends on it.
+  ToneMap tone_map = ToneMap::kSrgb;
+  float exposure = 0.0f; ///< stops, [-32, 32]
   AoConfig ao;
   DenoiserConfig denoiser;
   DetailConfig detail;
 
   bool shades() const { return view != FrameView::kAo; }
+  Exposure display() const { return {tone_map, exposure}; }
   bool jitters() const { return jitter && ao_resolution == AoResolution::kFull; }
   /// Size at which rays are traced.
   ImageSize traced_size() const { return {size.width * supersample, size.height * supersample}; }

@@ -199,10 +199,12 @@ void FrameLoop::shade_frame(Progress& progress) {
   Progress unseen([&progress](std::string_view, uint64_t, uint64_t) { progress.advance(0); });
   const Stopwatch shading;
   if (!shade_scene_) shade_scene_ = std::make_unique<ShadeScene>(*scene().source);
+  shade_scene_->turn_lights(config_.shade.light_turn);
   const ShadeSamples samples{config_.ao.seed, next_number_, ao_radius(config_.ao, traced_source().world_bounds())};
   report_.shade_rays = trace_shading(state_.camera_source(), *tracers().front(), *shade_scene_, *traced_view_, gbuffer_,
                                      config_.shade, samples, shaded_, unseen);
-  if (report_.moved) shaded_mean_.clear();
+  if (report_.moved || lights_turned_) shaded_mean_.clear();
+  lights_turned_ = false;
   shaded_mean_.add(shaded_);
   report_.times.shade_s += shading.seconds();
 }
@@ -344,9 +346,15 @@ void FrameLoop::resolve_surfaces(RenderedImage& image) const {
   write_cost_layers(config_, count_ray_costs(*packed, *traced_view_), image);
 }
 
+void FrameLoop::turn_lights(float degrees) {
+  lights_turned_ = lights_turned_ || config_.shade.light_turn != degrees;
+  config_.shade.light_turn = degrees;
+}
+
 void FrameLoop::show_layers(const FrameConfig& config) {
   config_.view_layers = config.view_layers;
   config_.surface_layers = config.surface_layers, config_.cost_layers = config.cost_layers;
+  if (config_.shades() && config.shades()) config_.view = config.view;
 }
 
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {

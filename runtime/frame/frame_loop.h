@@ -56,8 +56,12 @@ public:
   /// Goes on with other settings, whose `detail` is not read: levels of detail stay as they are. All frames are
   /// forgotten; trees are kept. Throws as the constructor does.
   void configure(const FrameConfig& config);
-  /// Sets which of the views, surface and cost layers are filled, from the next frame on. Forgets nothing.
+  /// Sets which of the views, surface and cost layers are filled from the next frame on, and which of the shaded views
+  /// is resolved. Forgets nothing.
   void show_layers(const FrameConfig& config);
+
+  /// Goes on with lights that are turned otherwise (ShadeConfig::light_turn). Only shading begins anew.
+  void turn_lights(float degrees);
 
   /// Number of occlusion pixels per frame.
   uint64_t frame_pixels() const;
@@ -104,6 +108,7 @@ private:
   std::unique_ptr<ShadeScene> shade_scene_;
   ShadedFrame shaded_;
   ShadedMean shaded_mean_;
+  bool lights_turned_ = false; ///< since the last shaded frame
   RenderedImage lod_layers_; ///< only its LOD layers
   ViewLayers views_;
   const DenoisedAo* denoised_ = nullptr; ///< of the denoiser's last denoise(); null without denoiser

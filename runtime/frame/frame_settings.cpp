@@ -25,6 +25,7 @@ std::string_view word_of(const NamedValues<T, kCount>& values, T value) {
 constexpr auto kResolutions = words_of(kAoResolutionNames);
 constexpr auto kRates = words_of(kAoRateNames);
 constexpr auto kSamplers = words_of(kAoSamplerNames);
+constexpr auto kToneMaps = words_of(kToneMapNames);
 constexpr std::array<std::string_view, 3> kDenoisers{"ours", "reference", "off"}; // in the order of DenoiserKind
 
 std::string_view denoiser_word(const FrameConfig& config) {
@@ -59,6 +60,9 @@ constexpr WordSetting kWordSettings[] = {
      "Denoiser of ambient occlusion. ours is the project's; reference is the pipeline of a public real-time sample, "
      "for comparison; off averages the frames",
      kDenoisers, denoiser_word, set_denoiser},
+    {"tone-map", "Curve of shaded pictures. srgb clips at white, aces rolls highlights off", kToneMaps,
+     [](const FrameConfig& c) { return word_of(kToneMapNames, c.tone_map); },
+     [](FrameConfig& c, std::string_view word) { c.tone_map = value_of(kToneMapNames, word, "tone-map"); }},
 };
 
 constexpr Setting<FrameConfig> kFrameSettings[] = {
@@ -70,6 +74,8 @@ constexpr Setting<FrameConfig> kFrameSettings[] = {
     {{"jitter",
       "Shift the camera rays of each frame within their pixels while nothing moves, so that edges become smooth", 0, 1},
      &FrameConfig::jitter},
+    {{"exposure", "Exposure of shaded pictures in stops: each doubles the brightness", -32, 32},
+     &FrameConfig::exposure},
 };
 
 } // namespace

@@ -17,13 +17,13 @@ struct WordSetting {
   void (*set)(FrameConfig& config, std::string_view word); ///< the word must be one of `words`
 };
 
-/// ao-resolution, ao-rate, ao-sampler and denoiser. The only description of them: options, help and the viewer use it.
+/// ao-resolution, ao-rate, ao-sampler, denoiser and tone-map. The only description of them: options, help and the viewer use it.
 std::span<const WordSetting> word_settings();
 
 /// The one with this name, which must exist.
 const WordSetting& word_setting(std::string_view name);
 
-/// Numbers and switches of FrameConfig itself, but its size: supersample and jitter.
+/// Numbers and switches of FrameConfig itself, but its size: supersample, jitter and exposure.
 std::span<const Setting<FrameConfig>> frame_settings();
 
 } // namespace packtrace

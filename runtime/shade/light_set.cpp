@@ -5,8 +5,10 @@
 #include <limits>
 #include <numbers>
 
+#include <glm/gtc/matrix_transform.hpp>
 #include <tbb/parallel_for.h>
 
+#include "pbrt_import/scene/world_view.h"
 #include "runtime/ao/hemisphere.h"
 #include "runtime/shade/bsdf.h"
 
@@ -48,6 +50,19 @@ LightSet::LightSet(const SceneSource& source) : source_(source) {
     uses_sky_ = true;
   }
   choose_probabilities();
+}
+
+void LightSet::turn(float degrees) {
+  if (degrees == turned_degrees_) return;
+  turned_degrees_ = degrees;
+  const std::span<const Light> at_rest = source_.lights();
+  const DVec3 up = estimate_world_view(source_.cameras()).up, middle = source_.world_bounds().centre();
+  const glm::dmat3 rotation(glm::rotate(glm::dmat4(1.0), glm::radians(double{degrees}), up));
+  for (size_t i = 0; i < at_rest.size(); ++i) {
+    lights_[i].position = middle + rotation * (at_rest[i].position - middle);
+    lights_[i].direction = glm::mat3(rotation) * at_rest[i].direction;
+    lights_[i].world_from_light = glm::mat3(rotation) * at_rest[i].world_from_light;
+  }
 }
 
 void LightSet::add_emitters() {

@@ -32,6 +32,10 @@ public:
   uint64_t triangle_count() const { return triangles_.size(); }
   size_t light_count() const { return lights_.size(); }
 
+  /// Turns the scene's lights from where they are at rest about the vertical (estimate_world_view()) through the middle
+  /// of the scene. Triangles that emit light stay.
+  void turn(float degrees);
+
   /// Samples one light.
   /// @param normal unit length, of the shaded surface
   /// @param choice in [0, 1): chooses the light
@@ -77,6 +81,7 @@ private:
   std::vector<float> probability_;   ///< of each light, then of each emitter
   std::vector<float> steps_;         ///< cumulative
   bool uses_sky_ = false;
+  float turned_degrees_ = 0.0f;
 };
 
 } // namespace packtrace

@@ -14,6 +14,7 @@ struct ShadeConfig {
   float ambient = 0.4f;       ///< radiance of the constant light from everywhere
   uint32_t light_samples = 4; ///< samples of the lights at the camera's hit; one at later hits
   uint32_t samples = 1;       ///< paths per pixel and frame
+  float light_turn = 0.0f;    ///< degrees by which the lights are turned about the vertical, [0, 360]
 
   bool operator==(const ShadeConfig&) const = default;
 };

@@ -15,6 +15,8 @@ public:
   explicit ShadeScene(const SceneSource& source);
 
   const LightSet& lights() const { return lights_; }
+  /// LightSet::turn().
+  void turn_lights(float degrees) { lights_.turn(degrees); }
   const DirectionalAlbedo& albedo(uint32_t material) const { return albedos_[albedo_of_[material]]; }
   /// Whether light may pass through some surface.
   bool transmits() const { return transmits_; }

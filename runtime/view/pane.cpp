@@ -1,5 +1,6 @@
 #include "runtime/view/pane.h"
 
+#include "runtime/view/layers.h"
 #include "runtime/view/view_settings.h"
 
 namespace packtrace {
@@ -13,8 +14,15 @@ MemoryReservation reserve_pane(const FrameConfig& config, const MemoryBudget& bu
 
 } // namespace
 
+FrameView PaneState::view() const {
+  if (layer == kPbrAo) return FrameView::kPbrAo;
+  return has_shaded_layer({layer}) ? FrameView::kPbr : FrameView::kAo;
+}
+
 FrameConfig PaneState::rendered_config() const {
   FrameConfig rendered = config;
+  rendered.view = view();
+  if (!rendered.shades()) rendered.shade = {};
   if (!ground_truth()) return rendered;
   rendered.denoise = false;
   rendered.ao_resolution = AoResolution::kFull, rendered.ao_rate = AoRate::kFull;
@@ -31,9 +39,13 @@ bool PaneRenderer::fits(const ViewFile& file, bool played) const {
 }
 
 bool PaneRenderer::configure(const FrameConfig& config) {
-  if (same_frames(loop_->config(), config)) {
+  FrameConfig lit = loop_->config();
+  const bool turned = lit.shade.light_turn != config.shade.light_turn;
+  lit.shade.light_turn = config.shade.light_turn;
+  if (same_frames(lit, config)) {
+    loop_->turn_lights(config.shade.light_turn);
     loop_->show_layers(config);
-    return false;
+    return turned;
   }
   config.validate();
   memory_.resize(picture_bytes(config), "the picture of a view");

@@ -17,12 +17,15 @@ struct PaneState {
   FrameConfig config;       ///< settings; its size and layers follow from the view, an AO radius of 0 from the scene
 
   bool ground_truth() const { return layer == kGroundTruth; }
-  /// The layer of the image: "ao" for the ground truth.
-  std::string image_layer() const { return ground_truth() ? "ao" : layer; }
+  /// What is rendered for the layer: shading for the layers of shaded images, ambient occlusion for all others.
+  FrameView view() const;
+  /// The layer of the image: "ao" for the ground truth, "pbr" for shading with occlusion.
+  std::string image_layer() const { return ground_truth() ? "ao" : layer == kPbrAo ? "pbr" : layer; }
   /// The settings with which the layer is rendered: those of `render --ground-truth` for the ground truth.
   FrameConfig rendered_config() const;
 
   static constexpr const char* kGroundTruth = "ground_truth";
+  static constexpr const char* kPbrAo = "pbr+ao"; ///< the layer "pbr" of `render --view pbr+ao`
 };
 
 /// Renders the frames of a pane: a frame loop, which is kept while the scene stays, and its last image.
@@ -35,7 +38,7 @@ public:
 
   /// Whether the frame loop renders this scene.
   bool fits(const ViewFile& file, bool played) const;
-  /// Goes on with other settings. Returns whether the frames so far were forgotten.
+  /// Goes on with other settings. Returns whether the frames so far were forgotten, or the lights have turned.
   bool configure(const FrameConfig& config);
   /// Forgets all frames, as if none had been rendered.
   void restart();

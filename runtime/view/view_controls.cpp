@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kDegreesPerPixel = 0.2;
 constexpr double kOrbitDegreesPerSecond = 20.0;
+constexpr double kLightDegreesPerSecond = 30.0;
 constexpr double kFaster = 4.0;          ///< with Shift
 constexpr double kWheelFactor = 1.25;    ///< of the speed
 constexpr double kScenesPerSecond = 0.1; ///< diagonals
@@ -30,7 +31,7 @@ constexpr KeyHelp kKeys[] = {
     {"Views", "0", "ground truth: no denoiser, all rays"},
     {"Views", "1", "raw occlusion of the last frame"},
     {"Views", "2", "denoised occlusion"},
-    {"Views", "3", "occlusion times albedo; Enter: albedo alone, and back"},
+    {"Views", "3", "shaded with materials and lights, or occlusion times albedo; Enter: without occlusion, and back"},
     {"Views", "4", "short or long occlusion rays"},
     {"Views", "Tab, V", "next and previous view"},
     {"Views", "X", "split: two views with a divider"},
@@ -38,6 +39,7 @@ constexpr KeyHelp kKeys[] = {
     {"Views", "PageDown, PageUp", "next and previous file"},
     {"Motion", "C", "the camera turns about its pivot"},
     {"Motion", "T", "the scene's motion plays, or the scene is at rest"},
+    {"Motion", "L", "the lights turn about the scene"},
     {"Motion", "Space", "pause and continue"},
     {"Output", "P", "save the picture, and print the command that makes the same one"},
     {"Output", "R", "record the camera's path, and save it"},
@@ -67,8 +69,8 @@ constexpr std::array<RequestKey, 7> kRequestKeys{{{"p", ViewRequest::kScreenshot
                                                   {"h", ViewRequest::kHelp},
                                                   {"f11", ViewRequest::kFullScreen},
                                                   {"escape", ViewRequest::kQuit}}};
-constexpr std::array<std::string_view, 23> kOtherKeys{"0",    "1",  "2",        "3",      "4",  "enter", "tab",   "v",
-                                                      "x",    "z",  "pagedown", "pageup", "c",  "t",     "space", "f",
+constexpr std::array<std::string_view, 24> kOtherKeys{"0",    "1",  "2",        "3",      "4",  "enter", "tab",   "v",
+                                                      "x",    "z",  "pagedown", "pageup", "c",  "t",     "space", "f",    "l",
                                                       "home", "f1", "f2",       "f3",     "f4", "shift", "ctrl"};
 
 [[noreturn]] void refuse_key(std::string_view key) {
@@ -111,6 +113,11 @@ void ViewControls::release(std::string_view key) {
   if (const auto it = held_.find(key); it != held_.end()) held_.erase(it);
 }
 
+/// Whether the file of the first pane holds what shading needs.
+bool ViewControls::shades() const {
+  return session_.files()[session_.pane(0).file].at_rest.source->has_shading();
+}
+
 bool ViewControls::press_view(std::string_view key) {
   ViewSession& s = session_;
   if (key == "0")
@@ -120,7 +127,9 @@ bool ViewControls::press_view(std::string_view key) {
   else if (key == "2")
     s.set_layer(0, "ao");
   else if (key == "3")
-    s.set_layer(0, "shaded");
+    s.set_layer(0, shades() ? PaneState::kPbrAo : "shaded");
+  else if (key == "enter" && shades())
+    s.set_layer(0, s.pane(0).layer == PaneState::kPbrAo ? "pbr" : PaneState::kPbrAo);
   else if (key == "enter")
     s.set_layer(0, s.pane(0).layer == "shaded" ? "albedo" : "shaded");
   else if (key == "tab")
@@ -158,6 +167,8 @@ bool ViewControls::press_motion(std::string_view key) {
     else
       s.set_time(s.files()[s.pane(0).file].begin_s);
     plays_ = !plays_;
+  } else if (key == "l") {
+    lights_turn_ = !lights_turn_;
   } else if (key == "space") {
     paused_ = !paused_;
   } else if (key == "f") {
@@ -224,6 +235,8 @@ void ViewControls::advance(double seconds) {
   if (direction != DVec3(0.0)) session_.move_camera([&](ViewCamera& camera) { camera.move(direction * distance); });
   if (orbits_ && !paused_)
     session_.move_camera([&](ViewCamera& camera) { camera.turn(kOrbitDegreesPerSecond * seconds, 0.0); });
+  if (lights_turn_ && !paused_)
+    session_.turn_lights(double{session_.pane(0).config.shade.light_turn} + kLightDegreesPerSecond * seconds);
   if (plays_ && !paused_ && session_.time()) {
     const ViewFile& file = session_.files()[session_.pane(0).file];
     const double next = *session_.time() + seconds;

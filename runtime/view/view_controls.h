@@ -48,12 +48,13 @@ public:
   /// Lets time pass before a frame: held keys move the camera, and what plays goes on.
   void advance(double seconds);
   /// Whether the next frame moves without further input.
-  bool busy() const { return orbits_ || (plays_ && !paused_) || flies(); }
+  bool busy() const { return ((orbits_ || plays_ || lights_turn_) && !paused_) || flies(); }
 
   double speed() const { return speed_; } ///< world units per second
   bool paused() const { return paused_; }
   bool plays() const { return plays_; }
   bool orbits() const { return orbits_; }
+  bool lights_turn() const { return lights_turn_; }
 
   /// Records the camera at each advance() from now on, or ends that.
   void record(bool on);
@@ -63,6 +64,7 @@ public:
 
 private:
   bool flies() const;
+  bool shades() const;
   bool press_view(std::string_view key);
   bool press_motion(std::string_view key);
   bool press_bookmark(std::string_view key, bool ctrl);
@@ -73,7 +75,7 @@ private:
   std::set<std::string, std::less<>> held_;
   double speed_;
   double long_radius_ = 0.0; ///< AO radius to go back to from the short one
-  bool orbits_ = false, plays_ = false, paused_ = false, short_rays_ = false, recording_ = false;
+  bool orbits_ = false, plays_ = false, lights_turn_ = false, paused_ = false, short_rays_ = false, recording_ = false;
   double recorded_s_ = 0.0;
   std::vector<CameraKey> recorded_;
   std::array<std::optional<CameraKey>, 4> bookmarks_;

@@ -34,7 +34,7 @@ void add_report(const PictureReport& of_pane, PictureReport& sum) {
 
 std::vector<std::string> view_layer_names() {
   std::vector<std::string> names = aov_names();
-  std::erase_if(names, [](const std::string& name) { return has_shaded_layer({name}); });
+  names.insert(std::ranges::find(names, "pbr") + 1, PaneState::kPbrAo);
   names.insert(names.begin() + 1, PaneState::kGroundTruth);
   return names;
 }
@@ -76,6 +76,9 @@ void ViewSession::require_layer(const PaneState& pane) const {
     const std::vector<std::string_view> known(names.begin(), names.end());
     throw Error(ErrorKind::kUsage, "no such view: " + pane.layer + did_you_mean_text(closest_name(pane.layer, known)));
   }
+  require_view(pane.view() == FrameView::kAo || files_[pane.file].at_rest.source->has_shading(),
+               pane.layer + ": " + files_[pane.file].name +
+                   " holds no materials and lights; bake it with --for shading");
   require_view(!has_denoiser_layer({pane.layer}) || pane.config.denoise, pane.layer + " requires a denoiser");
   require_view(!has_cost_layer({pane.layer}) || files_[pane.file].at_rest.backend.backend == Backend::kPacked,
                pane.layer + " requires --backend packed");
@@ -140,6 +143,14 @@ void ViewSession::set_time(std::optional<double> time_s) {
   moved_ = true;
 }
 
+void ViewSession::turn_lights(double degrees) {
+  double turn = std::fmod(degrees, 360.0);
+  if (turn < 0.0) turn += 360.0;
+  for (PaneState& pane : panes_) pane.config.shade.light_turn = static_cast<float>(turn);
+  moved_ = moved_ || std::any_of(panes_.begin(), panes_.begin() + static_cast<ptrdiff_t>(shown_panes()),
+                                 [](const PaneState& pane) { return pane.view() != FrameView::kAo; });
+}
+
 bool ViewSession::set_pivot(uint32_t x, uint32_t y) {
   const Pick picked = pick(pane_at(x), x, y);
   if (!picked.surface) return false;
@@ -185,7 +196,8 @@ void ViewSession::prepare(uint32_t quality) {
     }
     const ViewFile& file = files_[panes_[i].file];
     const FrameConfig config = frame_config(panes_[i], quality);
-    const bool alike = i > 0 && panes_[i].file == panes_[0].file && same_frames(renderers_[0]->loop().config(), config);
+    const bool alike = i > 0 && panes_[i].file == panes_[0].file && same_frames(renderers_[0]->loop().config(), config) &&
+                       renderers_[0]->loop().config().view == config.view;
     if (alike) {
       renderer = renderers_[0];
       continue;
@@ -255,13 +267,13 @@ const FrameConfig& ViewSession::rendered_config(size_t pane) const {
 }
 
 Image ViewSession::picture() {
-  const PreviewStyle plain{std::nullopt, false};
+  const auto plain = [&](size_t pane) { return PreviewStyle{std::nullopt, false, panes_[pane].config.display()}; };
   if (split_ == SplitMode::kDifference)
     return difference_picture(image(0), panes_[0].image_layer(), image(1), panes_[1].image_layer(),
                               static_cast<float>(gain_));
-  Image left = layer_preview(image(0), panes_[0].image_layer(), plain);
+  Image left = layer_preview(image(0), panes_[0].image_layer(), plain(0));
   if (split_ == SplitMode::kOff) return left;
-  const Image right = layer_preview(image(1), panes_[1].image_layer(), plain);
+  const Image right = layer_preview(image(1), panes_[1].image_layer(), plain(1));
   const auto begin = static_cast<uint32_t>(std::lround(divider_ * left.size.width));
   for (uint32_t y = 0; y < left.size.height; ++y)
     for (uint32_t x = begin; x < left.size.width; ++x) std::ranges::copy(right.pixel(x, y), left.pixel(x, y).begin());
@@ -313,6 +325,10 @@ std::vector<std::string> ViewSession::command(size_t pane) const {
   option("--frames", std::to_string(last_.still_frames));
   FrameConfig stated = state.config;
   if (state.ground_truth()) stated.ao_resolution = AoResolution::kFull, stated.ao_rate = AoRate::kFull;
+  if (state.view() == FrameView::kAo)
+    stated.shade = {}, stated.tone_map = FrameConfig().tone_map, stated.exposure = FrameConfig().exposure;
+  else
+    option("--view", state.view() == FrameView::kPbr ? "pbr" : "pbr+ao");
   const std::vector<std::string> settings = setting_words(stated);
   words.insert(words.end(), settings.begin(), settings.end());
   option("--aov", state.image_layer());

@@ -34,7 +34,7 @@ struct ViewFrame {
   PictureReport report;      ///< sums over the panes
 };
 
-/// The layers that a pane can show: those of `render --aov`, and "ground_truth".
+/// The layers that a pane can show: those of `render --aov`, "ground_truth", and "pbr+ao".
 std::vector<std::string> view_layer_names();
 
 /// What a viewer shows, without a window: files, two panes, a camera, and a frame after another. While something moves,
@@ -98,6 +98,8 @@ public:
   /// Shows the scene at a time of its motion, or at rest.
   void set_time(std::optional<double> time_s);
   std::optional<double> time() const { return time_; }
+  /// Turns the lights of both panes about the vertical (ShadeConfig::light_turn).
+  void turn_lights(double degrees);
   /// Points the pivot at the surface in a pixel of the first pane. Returns false if there is none.
   bool set_pivot(uint32_t x, uint32_t y);
   /// Makes the first pane's bounds fill the view.

@@ -10,7 +10,8 @@
 namespace packtrace {
 namespace {
 
-constexpr std::string_view kAoPrefix = "ao.", kDenoiserPrefix = "denoiser.", kSeed = "seed";
+constexpr std::string_view kToneMap = "tone-map", kAoPrefix = "ao.", kDenoiserPrefix = "denoiser.", kShadePrefix = "shade.",
+                           kExposure = "exposure", kSeed = "seed";
 
 std::string value_text(bool is_switch, double value) {
   if (is_switch) return value != 0.0 ? "on" : "off";
@@ -40,7 +41,7 @@ void list(std::span<const Setting<Config>> table, const std::string& group, std:
 
 ViewSetting word_view(const WordSetting& word, const FrameConfig& config) {
   ViewSetting setting;
-  setting.group = word.name.starts_with("ao") ? "ao" : "denoiser";
+  setting.group = word.name.starts_with("ao") ? "ao" : word.name == kToneMap ? "shading" : "denoiser";
   setting.name = word.name;
   setting.help = word.help;
   setting.words.assign(word.words.begin(), word.words.end());
@@ -91,15 +92,19 @@ void refuse_name(const FrameConfig& config, std::string_view name) {
 std::vector<ViewSetting> view_settings(const FrameConfig& config) {
   std::vector<ViewSetting> all;
   list(frame_settings(), "frames", "", config, all);
+  for (ViewSetting& setting : all)
+    if (setting.name == kExposure) setting.group = "shading";
   for (const WordSetting& word : word_settings())
-    if (word.name != "denoiser") all.push_back(word_view(word, config));
+    if (word.name.starts_with("ao")) all.push_back(word_view(word, config));
   all.push_back(seed_view(config));
   list(ao_settings(), "ao", kAoPrefix, config.ao, all);
   all.push_back(word_view(word_setting("denoiser"), config));
-  if (!config.denoise) return all;
-  for (const SettingView& s : denoiser_settings(config.denoiser))
-    all.push_back(
-        number_setting("denoiser", kDenoiserPrefix, s.info, s.is_switch, s.is_integer, s.value, s.default_value));
+  if (config.denoise)
+    for (const SettingView& s : denoiser_settings(config.denoiser))
+      all.push_back(
+          number_setting("denoiser", kDenoiserPrefix, s.info, s.is_switch, s.is_integer, s.value, s.default_value));
+  all.push_back(word_view(word_setting(kToneMap), config));
+  list(shade_settings(), "shading", kShadePrefix, config.shade, all);
   return all;
 }
 
@@ -114,6 +119,9 @@ void set_view_setting(FrameConfig& config, std::string_view name, std::string_vi
   } else if (name.starts_with(kAoPrefix)) {
     assign_setting(ao_settings(), std::string(name.substr(kAoPrefix.size())) + "=" + assignment, changed.ao,
                    "ambient occlusion");
+  } else if (name.starts_with(kShadePrefix)) {
+    assign_setting(shade_settings(), std::string(name.substr(kShadePrefix.size())) + "=" + assignment, changed.shade,
+                   "shading");
   } else if (name.starts_with(kDenoiserPrefix)) {
     if (!config.denoise) throw Error(ErrorKind::kUsage, std::string(name) + " changes nothing with the denoiser off");
     changed.denoiser.set(std::string(name.substr(kDenoiserPrefix.size())) + "=" + assignment);
@@ -127,7 +135,10 @@ void set_view_setting(FrameConfig& config, std::string_view name, std::string_vi
 }
 
 bool same_frames(const FrameConfig& a, const FrameConfig& b) {
-  return a.size == b.size && a.lod_layers == b.lod_layers && setting_words(a) == setting_words(b);
+  FrameConfig shown_alike = b;
+  shown_alike.tone_map = a.tone_map, shown_alike.exposure = a.exposure;
+  return a.size == b.size && a.lod_layers == b.lod_layers && a.shades() == b.shades() &&
+         setting_words(a) == setting_words(shown_alike);
 }
 
 std::vector<std::string> setting_words(const FrameConfig& config) {
@@ -142,6 +153,8 @@ std::vector<std::string> setting_words(const FrameConfig& config) {
       option("--ao-set", s.name.substr(kAoPrefix.size()) + "=" + s.value);
     else if (s.name.starts_with(kDenoiserPrefix))
       option("--denoiser-set", s.name.substr(kDenoiserPrefix.size()) + "=" + s.value);
+    else if (s.name.starts_with(kShadePrefix))
+      option("--shade-set", s.name.substr(kShadePrefix.size()) + "=" + s.value);
     else if (s.name == "jitter")
       words.emplace_back("--no-jitter"); // the only value that is not the default
     else

@@ -12,8 +12,8 @@ namespace packtrace {
 /// A setting as the window, scripts and files of settings show it. Everything comes from the descriptions that the
 /// command line uses.
 struct ViewSetting {
-  std::string group; ///< "frames", "ao", "denoiser"
-  std::string name;  ///< within all groups: "supersample", "ao-rate", "ao.lambda", "denoiser.window"
+  std::string group; ///< "frames", "ao", "denoiser", "shading"
+  std::string name;  ///< within all groups: "supersample", "ao-rate", "ao.lambda", "denoiser.window", "shade.depth"
   std::string help;
   std::vector<std::string> words; ///< the values, if they are words; else the value is a number in [low, high]
   bool is_switch = false, is_integer = false;

@@ -86,8 +86,8 @@ bool edit_setting(const ViewSetting& s, std::string& value) {
 }
 
 void draw_settings(const std::vector<ViewSetting>& settings, size_t pane, FrameThread& frames) {
-  static constexpr std::array<std::pair<const char*, const char*>, 3> kGroups{
-      {{"frames", "Frames"}, {"ao", "Ambient occlusion"}, {"denoiser", "Denoiser"}}};
+  static constexpr std::array<std::pair<const char*, const char*>, 4> kGroups{
+      {{"frames", "Frames"}, {"ao", "Ambient occlusion"}, {"denoiser", "Denoiser"}, {"shading", "Shading"}}};
   for (const auto& [group, title] : kGroups) {
     if (!ImGui::CollapsingHeader(title)) continue;
     for (const ViewSetting& setting : settings) {
@@ -308,8 +308,8 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
     if (ImGui::Button("Save settings")) frames.post(actions.save_settings);
     ImGui::SameLine();
     if (ImGui::Button("Help (H)")) help = !help;
-    text_line(fmt::format("speed {:.3g} units per second{}{}{}", shown.speed, shown.orbits ? ", orbit" : "",
-                          shown.plays ? ", plays" : "", shown.paused ? ", paused" : ""));
+    text_line(fmt::format("speed {:.3g} units per second{}{}{}{}", shown.speed, shown.orbits ? ", orbit" : "",
+                          shown.plays ? ", plays" : "", shown.lights_turn ? ", lights turn" : "", shown.paused ? ", paused" : ""));
     if (shown.recording) ImGui::TextColored({1.0f, 0.4f, 0.3f, 1.0f}, "recording the camera");
   }
   ImGui::End();
