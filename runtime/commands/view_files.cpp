@@ -23,8 +23,8 @@ struct LoadedView {
 
   LoadedScene scene; ///< not movable: its source refers to it
   SceneMotion motion;
-  std::vector<std::string> instance_names; ///< empty until they are needed
-  std::optional<FileSummary> summary;      ///< the same
+  std::optional<MotionTargets> targets; ///< none until they are needed
+  std::optional<FileSummary> summary;   ///< the same
 
   const FileSummary& file_summary() {
     if (!summary) summary = summarize(*scene.baked);
@@ -99,11 +99,10 @@ ViewFile load_view_file(const std::string& name, const RenderOptions& options, c
   if (loaded->motion.moves()) file.moving.motion = &loaded->motion;
   file.moving.deforms = baked != nullptr && !baked->sections().deformation.empty();
   file.begin_s = loaded->motion.begin_s(), file.end_s = loaded->motion.end_s();
-  file.instance_names = [cache = loaded.get()]() -> const std::vector<std::string>& {
-    if (cache->instance_names.empty())
-      for (const MotionTarget& target : targets_of(cache->scene).instances)
-        cache->instance_names.push_back(target.name);
-    return cache->instance_names;
+  file.motion = &loaded->motion;
+  file.targets = [cache = loaded.get()]() -> const MotionTargets& {
+    if (!cache->targets) cache->targets = targets_of(cache->scene);
+    return *cache->targets;
   };
   file.material_names = material_names(loaded->scene);
   if (baked != nullptr) {

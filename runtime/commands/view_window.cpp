@@ -47,7 +47,7 @@ public:
   ~WindowFiles() { closing_ = true; }
 
   void screenshot(ViewSession& session) {
-    const std::string base = free_name(session.files()[session.pane(0).file].name, {".png", ".exr"});
+    const std::string base = free_name(session.files()[session.pane(0).file].name, {".png", ".exr", ".keys.json"});
     if (session.split() == SplitMode::kOff) {
       save_pane(session, 0, base);
       return;
@@ -105,6 +105,12 @@ private:
   void save_pane(ViewSession& session, size_t pane, const std::string& base) {
     const std::vector<std::string> files{base + ".png", base + ".exr"};
     outputs_.save_pane(session, pane, files);
+    const size_t file = session.pane(pane).file;
+    if (const HandMoves& moves = session.hand_moves(file); !moves.empty()) {
+      const std::string keys = base + ".keys.json";
+      outputs_.save_text(keys, moves.keys_text(session.files()[file]));
+      session.set_keys_file(file, keys);
+    }
     const std::vector<std::string> command = session.command(pane);
     outputs_.report({{"screenshot", files}, {"pane", pane}, {"command", command}});
     frames_.set_status("saved " + base + ".png and .exr" +

@@ -60,6 +60,8 @@ public:
   /// is resolved. Forgets nothing.
   void show_layers(const FrameConfig& config);
 
+  /// SceneState::follow_motion().
+  bool follow_motion(const SceneMotion& motion) { return state_.follow_motion(motion); }
   /// Goes on with lights that are turned otherwise (ShadeConfig::light_turn). Only shading begins anew.
   void turn_lights(float degrees);
 
@@ -109,7 +111,7 @@ private:
   ShadedFrame shaded_;
   ShadedMean shaded_mean_;
   bool lights_turned_ = false; ///< since the last shaded frame
-  RenderedImage lod_layers_; ///< only its LOD layers
+  RenderedImage lod_layers_;   ///< only its LOD layers
   ViewLayers views_;
   const DenoisedAo* denoised_ = nullptr; ///< of the denoiser's last denoise(); null without denoiser
   FrameReport report_;

@@ -1,5 +1,6 @@
 #include "runtime/frame/scene_state.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "pbrt_import/base/error.h"
@@ -14,7 +15,8 @@ namespace packtrace {
 SceneState::SceneState(const FrameScene& scene, const DetailConfig& detail) : scene_(scene), detail_(detail) {
   if (scene_.motion != nullptr && scene_.motion->moves()) {
     const std::span<const uint32_t> moving = scene_.motion->moving_instances();
-    scene_.backend.movers = {{moving.begin(), moving.end()}, scene_.motion->moving_bounds()};
+    scene_.backend.movers = {{moving.begin(), moving.end()},
+                             scene_.motion_bounds.empty() ? scene_.motion->moving_bounds() : scene_.motion_bounds};
     for (const PlacedGeometry& instance : scene_.source->instances()) last_world_.push_back(instance.world_from_object);
     pose_.resize(moving.size()), last_pose_.resize(moving.size());
   }
@@ -44,6 +46,16 @@ void SceneState::reset() {
   started_ = false;
   if (levels_) levels_->reset();
   if (boxes_) boxes_->reset();
+}
+
+bool SceneState::follow_motion(const SceneMotion& motion) {
+  const Movers& movers = scene_.backend.movers;
+  if (scene_.motion == nullptr || !std::ranges::equal(movers.instances, motion.moving_instances())) return false;
+  Bounds all = movers.world;
+  all.extend(motion.moving_bounds());
+  if (all.lo != movers.world.lo || all.hi != movers.world.hi) return false;
+  scene_.motion = &motion;
+  return true;
 }
 
 std::vector<uint8_t> SceneState::save() const { return levels_ ? levels_->levels() : std::vector<uint8_t>(); }

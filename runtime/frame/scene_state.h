@@ -24,6 +24,7 @@ struct FrameScene {
   TracerConfig backend;
   const SceneMotion* motion = nullptr; ///< of the instances; null: none moves
   bool deforms = false;                ///< plays the deforming meshes of `file`, again and again; backend packed only
+  Bounds motion_bounds = {};           ///< of all moving instances at all times; empty: those of `motion`
 };
 
 /// A scene at the time of a frame, ready to be traced: places of instances, vertices of deforming meshes, levels by
@@ -34,6 +35,10 @@ public:
   /// backend than packed.
   SceneState(const FrameScene& scene, const DetailConfig& detail);
   ~SceneState();
+
+  /// Goes on with another motion of the same instances. Returns false, and changes nothing, if it moves others, or
+  /// beyond the bounds of the motion so far.
+  bool follow_motion(const SceneMotion& motion);
 
   /// Goes on to the next frame. Returns whether something moved or changed since the one before.
   /// @param eye chooses the levels by distance

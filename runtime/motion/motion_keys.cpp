@@ -58,14 +58,9 @@ private:
       given_[instance] = name;
       InstanceMotion moving;
       moving.instance = instance, moving.track = track, moving.relative = true;
-      moving.pivot = pivot.value_or(centre_of(targets_.instances[instance]));
+      moving.pivot = pivot.value_or(default_pivot(targets_.instances[instance]));
       motion_.instances.push_back(moving);
     }
-  }
-
-  static Vec3 centre_of(const MotionTarget& target) {
-    if (target.box.empty()) return target.placement[3];
-    return Vec3(transform_bounds(DAffine(target.placement), target.box).centre());
   }
 
   /// The instances that a name addresses. Throws if there are none, or if one cannot move.

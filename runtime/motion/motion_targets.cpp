@@ -60,6 +60,11 @@ Bounds bounds_of_frames(const baked::GeometryRecord& geometry, const baked::Defo
 
 } // namespace
 
+Vec3 default_pivot(const MotionTarget& target) {
+  if (target.box.empty()) return target.placement[3];
+  return Vec3(transform_bounds(DAffine(target.placement), target.box).centre());
+}
+
 MotionTargets motion_targets(const BakedFile& file) {
   MotionTargets targets;
   targets.origin = file.origin();

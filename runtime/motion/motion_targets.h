@@ -24,6 +24,9 @@ struct MotionTargets {
   DVec3 origin{0.0}; ///< Scene::origin
 };
 
+/// The point about which keys turn and scale an instance that name none: the centre of its box at rest.
+Vec3 default_pivot(const MotionTarget& target);
+
 /// Objects of a file that share a geometry have the name of the first of them.
 MotionTargets motion_targets(const BakedFile& file);
 

@@ -214,6 +214,7 @@ void FrameThread::publish(double step_ms) {
   shown->paused = controls_->paused(), shown->plays = controls_->plays(), shown->orbits = controls_->orbits();
   shown->lights_turn = controls_->lights_turn();
   shown->recording = controls_->recording();
+  shown->gizmo = s.gizmo();
   shown->command = host_.command_text(s.command(0));
   if (s.split() == SplitMode::kDifference && !s.last().moving && s.size().pixels() <= kLiveMetrics)
     shown->metrics = s.metrics();

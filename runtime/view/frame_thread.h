@@ -33,6 +33,7 @@ struct ViewSnapshot {
   SplitMode split = SplitMode::kOff;
   double divider = 0.5, gain = 8.0, speed = 0.0, target_ms = 0.0;
   bool paused = false, plays = false, orbits = false, lights_turn = false, recording = false;
+  std::optional<Gizmo> gizmo;           ///< of the picked instance
   std::optional<Pick> pick;             ///< of the last set_pick()
   std::optional<FileContents> contents; ///< of the first pane, if show_contents()
   std::optional<DifferenceMetrics> metrics;

@@ -12,6 +12,23 @@ MemoryReservation reserve_pane(const FrameConfig& config, const MemoryBudget& bu
   return {budget, picture_bytes(config), "the picture of a view"};
 }
 
+/// The bounds of what moves, with room to move about.
+Bounds wide_bounds(const SceneMotion& motion, const SceneSource& source) {
+  Bounds bounds = motion.moving_bounds();
+  bounds.extend(source.world_bounds());
+  const DVec3 room(0.5 * bounds.diagonal());
+  bounds.lo -= room, bounds.hi += room;
+  return bounds;
+}
+
+FrameScene frame_scene(const PaneRenderer::Scene& scene) {
+  if (!scene.by_hand) return scene.played ? scene.file.moving : scene.file.at_rest;
+  FrameScene moved = scene.file.moving;
+  moved.motion = scene.by_hand.get();
+  if (scene.moving) moved.motion_bounds = wide_bounds(*scene.by_hand, *moved.source);
+  return moved;
+}
+
 } // namespace
 
 FrameView PaneState::view() const {
@@ -30,12 +47,18 @@ FrameConfig PaneState::rendered_config() const {
   return rendered;
 }
 
-PaneRenderer::PaneRenderer(const ViewFile& file, bool played, const FrameConfig& config, const MemoryBudget& budget)
-    : owner_(file.owner.get()), played_(played), memory_(reserve_pane(config, budget)),
-      loop_(std::make_unique<FrameLoop>(played ? file.moving : file.at_rest, config)) {}
+PaneRenderer::PaneRenderer(const Scene& scene, const FrameConfig& config, const MemoryBudget& budget)
+    : owner_(scene.file.owner.get()), played_(scene.played), by_hand_(scene.by_hand),
+      wide_(scene.by_hand && scene.moving), memory_(reserve_pane(config, budget)),
+      loop_(std::make_unique<FrameLoop>(frame_scene(scene), config)) {}
 
-bool PaneRenderer::fits(const ViewFile& file, bool played) const {
-  return owner_ == file.owner.get() && played_ == played;
+bool PaneRenderer::follow(const Scene& scene) {
+  if (owner_ != scene.file.owner.get() || played_ != scene.played) return false;
+  if (by_hand_ == scene.by_hand) return scene.moving || !wide_;
+  if (!by_hand_ || !scene.by_hand || !scene.moving || !loop_->follow_motion(*scene.by_hand)) return false;
+  by_hand_ = scene.by_hand;
+  wide_ = true;
+  return true;
 }
 
 bool PaneRenderer::configure(const FrameConfig& config) {

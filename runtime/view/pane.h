@@ -31,13 +31,20 @@ struct PaneState {
 /// Renders the frames of a pane: a frame loop, which is kept while the scene stays, and its last image.
 class PaneRenderer {
 public:
-  /// @param file must outlive this object's use
-  /// @param played the scene moves
+  /// What is rendered.
+  struct Scene {
+    const ViewFile& file; ///< must outlive the renderer's use
+    bool played = false;  ///< the scene moves
+    /// HandMoves::motion() of the file.
+    std::shared_ptr<const SceneMotion> by_hand;
+    /// Instances may be moved farther. The tracer's bounds are wide, so its last digits are not those of `render`.
+    bool moving = false;
+  };
   /// Throws like FrameLoop, and MemoryError.
-  PaneRenderer(const ViewFile& file, bool played, const FrameConfig& config, const MemoryBudget& budget);
+  PaneRenderer(const Scene& scene, const FrameConfig& config, const MemoryBudget& budget);
 
-  /// Whether the frame loop renders this scene.
-  bool fits(const ViewFile& file, bool played) const;
+  /// Goes on with a scene. Returns false if that needs another renderer.
+  bool follow(const Scene& scene);
   /// Goes on with other settings. Returns whether the frames so far were forgotten, or the lights have turned.
   bool configure(const FrameConfig& config);
   /// Forgets all frames, as if none had been rendered.
@@ -56,6 +63,8 @@ public:
 private:
   const void* owner_; ///< tells files apart
   bool played_;
+  std::shared_ptr<const SceneMotion> by_hand_;
+  bool wide_; ///< the tracer's bounds are not those of by_hand_
   MemoryReservation memory_;
   std::unique_ptr<FrameLoop> loop_;
   RenderedImage image_;

@@ -17,6 +17,7 @@ Pick::Surface surface_at(const ViewFile& file, const FrameLoop& loop, size_t at)
   const SceneSource& source = *loop.scene().source;
   Pick::Surface surface;
   surface.position = DVec3(g.position[at]) + source.origin();
+  surface.instance = g.instance[at];
   surface.triangle = g.triangle[at], surface.material = g.material[at];
   surface.back_face = g.back_face[at] != 0;
   const SceneSource& traced = *(loop.config().detail.camera_uses_levels() ? &loop.traced_source() : &source);
@@ -24,9 +25,9 @@ Pick::Surface surface_at(const ViewFile& file, const FrameLoop& loop, size_t at)
   surface.position_error = traced.position_error(surface.geometry);
   const SurfaceDetail detail = traced.detail_of(g.instance[at], g.triangle[at]);
   surface.level = detail.level, surface.cluster = detail.cluster, surface.error_world = detail.error_world;
-  if (file.instance_names)
-    if (const auto& names = file.instance_names(); g.instance[at] < names.size())
-      surface.instance_name = names[g.instance[at]];
+  if (file.targets)
+    if (const auto& instances = file.targets().instances; g.instance[at] < instances.size())
+      surface.instance_name = instances[g.instance[at]].name;
   if (surface.material < file.material_names.size()) surface.material_name = file.material_names[surface.material];
   surface.flags = material_flag_words(source.materials()[surface.material].flags);
   return surface;

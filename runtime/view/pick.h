@@ -22,7 +22,7 @@ struct Pick {
   // Of the last frame's camera ray in the middle of the pixel; not set where that ray misses.
   struct Surface {
     DVec3 position{0}; ///< world coordinates
-    uint32_t triangle = 0, material = 0, geometry = 0;
+    uint32_t instance = 0, triangle = 0, material = 0, geometry = 0;
     uint32_t level = 0, cluster = 0;
     float error_world = 0;    ///< bound of the distance from level 0
     float position_error = 0; ///< bound of |decoded - source| per axis, in object units

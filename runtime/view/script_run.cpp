@@ -182,6 +182,20 @@ bool ScriptRun::run_camera() {
     const auto [x, y] = pixel();
     if (!session_.settle(progress_)) throw Error(ErrorKind::kCancelled, "cancelled");
     if (!session_.set_pivot(x, y)) fail("this pixel shows nothing");
+  } else if (is("select")) {
+    const auto [x, y] = pixel();
+    const size_t at = pane();
+    field_ = "select";
+    if (!session_.settle(progress_)) throw Error(ErrorKind::kCancelled, "cancelled");
+    session_.select(at, x, y);
+    if (!session_.selection()) fail("this pixel shows nothing");
+  } else if (is("move")) {
+    if (value_->is_null()) {
+      session_.put_selected_back();
+      return true;
+    }
+    const auto [x, y, z] = numbers<3>(*value_);
+    session_.move_selected({x, y, z});
   } else if (is("time")) {
     session_.set_time(value_->is_null() ? std::nullopt : std::optional(number(*value_)));
   } else {
@@ -246,6 +260,12 @@ bool ScriptRun::run_picture() {
     session_.fix_quality(value_->is_null() ? std::nullopt : std::optional(whole(*value_, 0, kCheapestStep)));
   } else if (is("target_ms")) {
     session_.set_target_ms(number(*value_));
+  } else if (is("keys")) {
+    const std::string file = text(*value_);
+    const size_t shown = session_.pane(0).file;
+    if (session_.hand_moves(shown).empty()) fail("nothing was moved");
+    host_.save_text(file, session_.hand_moves(shown).keys_text(session_.files()[shown]));
+    session_.set_keys_file(shown, file);
   } else if (is("record")) {
     if (value_->is_boolean() && value_->get<bool>()) {
       controls_.record(true);

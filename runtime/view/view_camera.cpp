@@ -13,7 +13,8 @@
 namespace packtrace {
 namespace {
 
-constexpr double kSteepest = 89.0; ///< degrees between the horizon and the view
+constexpr double kSteepAhead = 0.999; ///< cosine between forward and the vertical
+constexpr double kSteepest = 89.0;    ///< degrees between the horizon and the view
 
 /// Rounds to what camera_key_text() writes.
 double rounded(double value) {
@@ -122,6 +123,18 @@ void ViewCamera::turn(double right_degrees, double up_degrees) {
   const DAffine& m = camera_.world_from_camera;
   place(pivot_ + turned * (DVec3(m[3]) - pivot_), turned * glm::normalize(DVec3(m[2])),
         turned * glm::normalize(DVec3(m[1])));
+}
+
+glm::dmat3 ViewCamera::level_axes() const {
+  const DAffine& m = camera_.world_from_camera;
+  const DVec3 right = glm::normalize(DVec3(m[0])), up = glm::normalize(DVec3(m[1])),
+              forward = glm::normalize(DVec3(m[2]));
+  // A camera that looks along the vertical has its forwards at the upper edge of its picture.
+  const double steep = std::abs(glm::dot(forward, vertical_));
+  const DVec3 ahead = steep < kSteepAhead ? forward : up;
+  const DVec3 level = glm::normalize(ahead - vertical_ * glm::dot(ahead, vertical_));
+  const DVec3 side = glm::cross(vertical_, level);
+  return {glm::dot(side, right) < 0.0 ? -side : side, vertical_, level};
 }
 
 void ViewCamera::frame(const Bounds& bounds) {

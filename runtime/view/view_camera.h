@@ -47,6 +47,9 @@ public:
   /// Moves to a distance from which the whole box fits into the view, in the direction of the view.
   void frame(const Bounds& bounds);
 
+  /// Unit vectors to the right, upwards and forwards for things that stand upright: up is the vertical.
+  glm::dmat3 level_axes() const;
+
   /// The centre of turn(), relative to the origin; until it is set, the point that the base looks at.
   DVec3 pivot() const { return pivot_; }
   void set_pivot(DVec3 point) { pivot_ = point; }

@@ -39,24 +39,39 @@ constexpr KeyHelp kKeys[] = {
     {"Views", "PageDown, PageUp", "next and previous file"},
     {"Motion", "C", "the camera turns about its pivot"},
     {"Motion", "T", "the scene's motion plays, or the scene is at rest"},
+    {"Motion", "U Y, J M, H K",
+     "move the clicked object up and down, away and back, left and right; or drag its arrows"},
+    {"Motion", "B", "put the clicked object back"},
     {"Motion", "L", "the lights turn about the scene"},
     {"Motion", "Space", "pause and continue"},
     {"Output", "P", "save the picture, and print the command that makes the same one"},
     {"Output", "R", "record the camera's path, and save it"},
     {"Output", "F9", "profile: 300 frames of an orbit, as a table"},
     {"Window", "Backspace", "show or hide the panels"},
-    {"Window", "H", "this help"},
+    {"Window", "I", "this help"},
     {"Window", "Alt+Enter, F11", "full screen"},
     {"Window", "Esc", "end"},
 };
 
-/// Keys that move the camera while they are down, and where to.
+/// Keys that move something while they are down, and where to: right, up, forwards.
 struct FlyKey {
   std::string_view name;
   DVec3 direction;
 };
 const std::array<FlyKey, 6> kFlyKeys{
     {{"w", {0, 0, 1}}, {"s", {0, 0, -1}}, {"a", {-1, 0, 0}}, {"d", {1, 0, 0}}, {"q", {0, -1, 0}}, {"e", {0, 1, 0}}}};
+
+/// Keys that move the picked instance while they are down, along ViewCamera::level_axes().
+const std::array<FlyKey, 6> kMoveKeys{
+    {{"u", {0, 1, 0}}, {"y", {0, -1, 0}}, {"j", {0, 0, 1}}, {"m", {0, 0, -1}}, {"h", {-1, 0, 0}}, {"k", {1, 0, 0}}}};
+
+/// The sum of the directions of the keys that are down.
+DVec3 held_direction(std::span<const FlyKey> keys, const std::set<std::string, std::less<>>& held) {
+  DVec3 direction(0.0);
+  for (const FlyKey& key : keys)
+    if (held.contains(key.name)) direction += key.direction;
+  return direction;
+}
 
 struct RequestKey {
   std::string_view name;
@@ -66,16 +81,17 @@ constexpr std::array<RequestKey, 7> kRequestKeys{{{"p", ViewRequest::kScreenshot
                                                   {"r", ViewRequest::kRecord},
                                                   {"f9", ViewRequest::kProfile},
                                                   {"backspace", ViewRequest::kMenu},
-                                                  {"h", ViewRequest::kHelp},
+                                                  {"i", ViewRequest::kHelp},
                                                   {"f11", ViewRequest::kFullScreen},
                                                   {"escape", ViewRequest::kQuit}}};
-constexpr std::array<std::string_view, 24> kOtherKeys{"0",    "1",  "2",        "3",      "4",  "enter", "tab",   "v",
-                                                      "x",    "z",  "pagedown", "pageup", "c",  "t",     "space", "f",    "l",
-                                                      "home", "f1", "f2",       "f3",     "f4", "shift", "ctrl"};
+constexpr std::array<std::string_view, 25> kOtherKeys{
+    "0", "1",     "2", "3", "4", "enter", "tab", "v",  "x",  "z",  "pagedown", "pageup", "c",
+    "t", "space", "f", "l", "b", "home",  "f1",  "f2", "f3", "f4", "shift",    "ctrl"};
 
 [[noreturn]] void refuse_key(std::string_view key) {
   std::vector<std::string_view> known(kOtherKeys.begin(), kOtherKeys.end());
   for (const FlyKey& fly : kFlyKeys) known.push_back(fly.name);
+  for (const FlyKey& move : kMoveKeys) known.push_back(move.name);
   for (const RequestKey& request : kRequestKeys) known.push_back(request.name);
   throw Error(ErrorKind::kUsage, "no such key: " + std::string(key) + did_you_mean_text(closest_name(key, known)));
 }
@@ -98,10 +114,17 @@ bool ViewControls::flies() const {
   return std::ranges::any_of(kFlyKeys, [&](const FlyKey& key) { return held_.contains(key.name); });
 }
 
+bool ViewControls::moves_selected() const {
+  return session_.selection() &&
+         std::ranges::any_of(kMoveKeys, [&](const FlyKey& key) { return held_.contains(key.name); });
+}
+
 ViewRequest ViewControls::press(std::string_view key, bool ctrl) {
   if (const ViewRequest request = view_request(key); request != ViewRequest::kNone) return request;
+  const bool moves = std::ranges::find(kMoveKeys, key, &FlyKey::name) != kMoveKeys.end();
+  if (moves) session_.move_selected(DVec3(0.0)); // says at once if that is not possible
   const bool held =
-      key == "shift" || key == "ctrl" || std::ranges::find(kFlyKeys, key, &FlyKey::name) != kFlyKeys.end();
+      moves || key == "shift" || key == "ctrl" || std::ranges::find(kFlyKeys, key, &FlyKey::name) != kFlyKeys.end();
   if (held)
     held_.insert(std::string(key));
   else if (!press_view(key) && !press_motion(key) && !press_bookmark(key, ctrl))
@@ -114,9 +137,7 @@ void ViewControls::release(std::string_view key) {
 }
 
 /// Whether the file of the first pane holds what shading needs.
-bool ViewControls::shades() const {
-  return session_.files()[session_.pane(0).file].at_rest.source->has_shading();
-}
+bool ViewControls::shades() const { return session_.files()[session_.pane(0).file].at_rest.source->has_shading(); }
 
 bool ViewControls::press_view(std::string_view key) {
   ViewSession& s = session_;
@@ -167,6 +188,8 @@ bool ViewControls::press_motion(std::string_view key) {
     else
       s.set_time(s.files()[s.pane(0).file].begin_s);
     plays_ = !plays_;
+  } else if (key == "b") {
+    s.put_selected_back();
   } else if (key == "l") {
     lights_turn_ = !lights_turn_;
   } else if (key == "space") {
@@ -228,11 +251,11 @@ void ViewControls::drag(MouseButton button, double dx, double dy) {
 void ViewControls::wheel(double steps) { speed_ *= std::pow(kWheelFactor, std::clamp(steps, -40.0, 40.0)); }
 
 void ViewControls::advance(double seconds) {
-  DVec3 direction(0.0);
-  for (const FlyKey& key : kFlyKeys)
-    if (held_.contains(key.name)) direction += key.direction;
+  const DVec3 direction = held_direction(kFlyKeys, held_), by_hand = held_direction(kMoveKeys, held_);
   const double distance = speed_ * seconds * (held_.contains("shift") ? kFaster : 1.0);
   if (direction != DVec3(0.0)) session_.move_camera([&](ViewCamera& camera) { camera.move(direction * distance); });
+  if (by_hand != DVec3(0.0) && session_.selection())
+    session_.move_selected(session_.camera().level_axes() * by_hand * distance);
   if (orbits_ && !paused_)
     session_.move_camera([&](ViewCamera& camera) { camera.turn(kOrbitDegreesPerSecond * seconds, 0.0); });
   if (lights_turn_ && !paused_)

@@ -48,7 +48,7 @@ public:
   /// Lets time pass before a frame: held keys move the camera, and what plays goes on.
   void advance(double seconds);
   /// Whether the next frame moves without further input.
-  bool busy() const { return ((orbits_ || plays_ || lights_turn_) && !paused_) || flies(); }
+  bool busy() const { return ((orbits_ || plays_ || lights_turn_) && !paused_) || flies() || moves_selected(); }
 
   double speed() const { return speed_; } ///< world units per second
   bool paused() const { return paused_; }
@@ -64,6 +64,7 @@ public:
 
 private:
   bool flies() const;
+  bool moves_selected() const;
   bool shades() const;
   bool press_view(std::string_view key);
   bool press_motion(std::string_view key);

@@ -12,13 +12,14 @@ namespace packtrace {
 
 /// A file that is shown.
 struct ViewFile {
-  std::string name;                  ///< as it was given
-  std::shared_ptr<const void> owner; ///< of everything below
-  FrameScene at_rest;                ///< nothing moves
-  FrameScene moving;                 ///< with the scene's motion; like at_rest if it has none
-  double begin_s = 0.0, end_s = 0.0; ///< of the motion
-  /// Names of the instances, by number. Called when the first is needed.
-  std::function<const std::vector<std::string>&()> instance_names;
+  std::string name;                    ///< as it was given
+  std::shared_ptr<const void> owner;   ///< of everything below
+  FrameScene at_rest;                  ///< nothing moves
+  FrameScene moving;                   ///< with the scene's motion; like at_rest if it has none
+  double begin_s = 0.0, end_s = 0.0;   ///< of the motion
+  const SceneMotion* motion = nullptr; ///< of the scene; moves nothing if `moving` has none
+  /// The instances as files of keys address them, by number. Called when the first is needed.
+  std::function<const MotionTargets&()> targets;
   std::vector<std::string> material_names; ///< by number
   /// Bytes by stream, and names of the geometries; not set for a .pbrt scene. Take a while: called when a panel shows
   /// them.

@@ -41,7 +41,7 @@ std::vector<std::string> view_layer_names() {
 
 ViewSession::ViewSession(std::vector<ViewFile> files, ViewCamera camera, const Config& config)
     : files_(std::move(files)), camera_(std::move(camera)), size_(config.size), memory_(config.memory),
-      quality_(config.target_ms) {
+      quality_(config.target_ms), hand_moves_(files_.size()) {
   for (PaneState& pane : panes_) pane.config = config.frame;
   if (files_.size() < 2) return;
   panes_[1].file = 1;
@@ -50,6 +50,7 @@ ViewSession::ViewSession(std::vector<ViewFile> files, ViewCamera camera, const C
 
 void ViewSession::add_file(ViewFile file) {
   files_.push_back(std::move(file));
+  hand_moves_.emplace_back();
   if (!camera_.key()) camera_.set(camera_.current_key());
 }
 
@@ -57,6 +58,8 @@ void ViewSession::replace_file(size_t index, ViewFile file, const ViewCamera& st
   for (size_t pane = 0; pane < renderers_.size(); ++pane)
     if (panes_[pane].file == index) renderers_[pane].reset(); // they refer to the old file
   files_.at(index) = std::move(file);
+  hand_moves_[index] = {};
+  if (selection_ && selection_->file == index) selection_.reset();
   if (time_ && !files_[index].moves()) time_.reset();
   if (index == 0) camera_.change_scene(start);
   restart_ = changed_ = true;
@@ -136,6 +139,9 @@ void ViewSession::fix_quality(std::optional<uint32_t> step) {
 void ViewSession::set_time(std::optional<double> time_s) {
   require_view(!time_s || files_[panes_[0].file].moves(), "nothing moves in " + files_[panes_[0].file].name);
   require_view(!time_s || std::isfinite(*time_s), "the time must be finite");
+  // Instances that were moved by hand are shown at a time.
+  const ViewFile& file = files_[panes_[0].file];
+  if (!time_s && file.moves() && !hand_moves_[panes_[0].file].empty()) time_s = file.begin_s;
   // At a time, `render` shows the scene's camera where it has moved to; the view's camera stays where it is.
   if (time_s && !camera_.key()) camera_.set(camera_.current_key());
   if (time_ == time_s) return;
@@ -196,19 +202,21 @@ void ViewSession::prepare(uint32_t quality) {
     }
     const ViewFile& file = files_[panes_[i].file];
     const FrameConfig config = frame_config(panes_[i], quality);
-    const bool alike = i > 0 && panes_[i].file == panes_[0].file && same_frames(renderers_[0]->loop().config(), config) &&
+    const bool alike = i > 0 && panes_[i].file == panes_[0].file &&
+                       same_frames(renderers_[0]->loop().config(), config) &&
                        renderers_[0]->loop().config().view == config.view;
     if (alike) {
       renderer = renderers_[0];
       continue;
     }
     if (i > 0 && renderer == renderers_[0]) renderer.reset();
-    if (renderer && renderer->fits(file, played)) {
+    const PaneRenderer::Scene scene{file, played, hand_moves_[panes_[i].file].motion(), last_.moving};
+    if (renderer && renderer->follow(scene)) {
       restart_ = renderer->configure(config) || restart_;
       continue;
     }
     renderer.reset(); // before the new one, for its memory
-    renderer = std::make_shared<PaneRenderer>(file, played, config, memory_);
+    renderer = std::make_shared<PaneRenderer>(scene, config, memory_);
     restart_ = true;
   }
 }
@@ -319,7 +327,9 @@ std::vector<std::string> ViewSession::command(size_t pane) const {
     words.emplace_back(name);
     words.push_back(value);
   };
-  if (time_) option("--start-time", fmt::format("{}", *time_));
+  const HandMoves& by_hand = hand_moves_[state.file];
+  if (!by_hand.empty()) option("--keys", by_hand.keys_file());
+  if (time_ || !by_hand.empty()) option("--start-time", fmt::format("{}", last_.time_s));
   option("--size", fmt::format("{}x{}", size_.width, size_.height));
   if (state.ground_truth()) words.emplace_back("--ground-truth");
   option("--frames", std::to_string(last_.still_frames));

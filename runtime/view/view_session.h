@@ -9,6 +9,8 @@
 
 #include "runtime/image/image.h"
 #include "runtime/view/file_contents.h"
+#include "runtime/view/gizmo.h"
+#include "runtime/view/hand_moves.h"
 #include "runtime/view/pane.h"
 #include "runtime/view/pick.h"
 #include "runtime/view/quality_control.h"
@@ -100,6 +102,29 @@ public:
   std::optional<double> time() const { return time_; }
   /// Turns the lights of both panes about the vertical (ShadeConfig::light_turn).
   void turn_lights(double degrees);
+  /// Picks the instance in a pixel of a pane to be moved, or none. Returns its name, empty if there is none.
+  std::string select(size_t pane, uint32_t x, uint32_t y);
+  /// The picked instance.
+  struct Selection {
+    size_t file;
+    uint32_t instance;
+  };
+  const std::optional<Selection>& selection() const { return selection_; }
+  /// Moves the picked instance by world units. A scene that moves is shown at a time from then on. Throws Error(kUsage)
+  /// if there is none, and if it cannot move.
+  void move_selected(DVec3 by);
+  /// Lets the picked instance stand where it did.
+  void put_selected_back();
+  /// The handles of the picked instance; none if it cannot be seen.
+  std::optional<Gizmo> gizmo() const;
+  /// Drags a handle of gizmo().
+  /// @param axis 0 to 2
+  /// @param by fractions of the picture, x right, y down
+  void drag_gizmo(size_t axis, glm::dvec2 by);
+  /// The instances of a file that were moved.
+  const HandMoves& hand_moves(size_t file) const { return hand_moves_[file]; }
+  /// Says where the keys of the moved instances of a file were saved (HandMoves::keys_text()), for command().
+  void set_keys_file(size_t file, const std::string& name) { hand_moves_.at(file).set_keys_file(name); }
   /// Points the pivot at the surface in a pixel of the first pane. Returns false if there is none.
   bool set_pivot(uint32_t x, uint32_t y);
   /// Makes the first pane's bounds fill the view.
@@ -143,6 +168,7 @@ private:
   void require_layer(const PaneState& pane) const;
   void change_pane(size_t index, const PaneState& changed);
   Camera camera_in(size_t file) const;
+  void show_moved();
   void resolve();
 
   std::vector<ViewFile> files_;
@@ -156,6 +182,8 @@ private:
   SplitMode split_ = SplitMode::kOff;
   double divider_ = 0.5, gain_ = 8.0;
   std::optional<double> time_;
+  std::vector<HandMoves> hand_moves_; ///< by file
+  std::optional<Selection> selection_;
   bool keep_views_ = false;
   bool moved_ = false; ///< since the last frame
   uint32_t still_frames_ = 0;

@@ -76,6 +76,31 @@ TEST(ViewCommand, ScreenshotsHaveTheBytesOfTheStatedCommand) {
   for (const nlohmann::json& result : results_of(bench.view(script))) expect_same_files(bench, result);
 }
 
+TEST(ViewCommand, ShadedPicturesAndMovedObjectsHaveTheBytesOfTheirCommands) {
+  const ViewWorkbench bench;
+  const std::string scene = std::string(PACKTRACE_SOURCE_DIR) + "/assets/features/instances.pbrt";
+  const std::string baked = bench / "letters.ptk";
+  ASSERT_EQ(run_packtrace({"bake", scene, "-o", baked, "--for", "shading", "-q"}).exit_code, 0);
+  const auto still = [&](const std::string& name) {
+    return line(R"({"still": 3})") +
+           line("{\"screenshot\": [\"" + bench / (name + ".png") + "\", \"" + bench / (name + ".exr") + "\"]}");
+  };
+  const std::string script = line(R"({"key": "3"})") + still("a") + line(R"({"key": "enter"})") +
+                             line(R"({"set": {"exposure": 1, "tone-map": "aces", "shade.depth": 1}})") + still("b") +
+                             line(R"({"key": "l", "frames": 5})") + line(R"({"key": "l"})") + still("c") +
+                             line(R"({"select": [32, 26]})") + line(R"({"key": "u", "frames": 9})") +
+                             line("{\"keys\": \"" + bench / "keys.json" + "\"}") + still("d");
+  write_text(bench / "letters.jsonl", script);
+  for (const std::string& file : {baked, scene}) {
+    const CommandResult shown = run_packtrace({"view", file, "--size", "64x48", "--camera", "lookat:0,1,-4,0,0.5,0",
+                                               "--headless", bench / "letters.jsonl", "--force"});
+    const std::vector<nlohmann::json> results = results_of(shown);
+    ASSERT_EQ(results.size(), 4u);
+    for (const nlohmann::json& result : results) expect_same_files(bench, result);
+    EXPECT_NE(read_text(bench / "c.png"), read_text(bench / "d.png"));
+  }
+}
+
 TEST(ViewCommand, TheSecondPaneHasACommandOfItsOwn) {
   const ViewWorkbench bench;
   const std::string script = line(R"({"split": "divider"})") + line(R"({"set": {"ao.radius": 0.2}, "pane": 1})") +

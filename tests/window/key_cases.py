@@ -1,5 +1,6 @@
 """Keys and mouse."""
 
+import json
 import os
 import struct
 
@@ -53,6 +54,99 @@ class Keys(WindowTest):
         viewer.still(2)
         self.expect_bytes_of_render(*viewer.screenshot())
         self.end(viewer)
+
+    def test_scenes_with_lights_are_shaded(self):
+        viewer = self.open(self.file("lit"))
+        for key, words in (("3", "--view pbr+ao"), ("Return", "--view pbr"), ("Return", "--view pbr+ao")):
+            viewer.press(key)
+            self.assertIn(words + " --aov pbr", viewer.shown())
+        viewer.still(2)
+        self.expect_bytes_of_render(*viewer.screenshot())
+        viewer.press("l")
+        viewer.moving()
+        viewer.press("space")
+        viewer.still(2)
+        command, files = viewer.screenshot()
+        self.assertIn("light_turn=", " ".join(command))
+        self.expect_bytes_of_render(command, files)
+        self.end(viewer)
+
+    def test_the_clicked_object_moves(self):
+        viewer = self.open(self.file("lit"))
+        viewer.press("u")
+        viewer.message("nothing is picked")
+        viewer.press("BackSpace")
+        place = self.object_in(viewer)
+        shown = set()
+        for key in "uyjmhk":
+            viewer.press("b")
+            viewer.hold(key)
+            viewer.moving()
+            viewer.release(key)
+            viewer.still(2)
+            command, files = viewer.screenshot()
+            keys = command[command.index("--keys") + 1]
+            with open(os.path.join(self.folder, keys), encoding="utf-8") as file:
+                shown.add(file.read())
+            if key == "u":
+                self.expect_bytes_of_render(command, files)
+        self.assertEqual(len(shown), 6)
+        viewer.press("b")
+        viewer.still(2)
+        self.assertNotIn("--keys", viewer.screenshot()[0])
+        viewer.click(1, 1)  # the sky
+        viewer.printed("pick")
+        viewer.press("k")
+        viewer.message("nothing is picked")
+        self.assertIsNotNone(place)
+        self.end(viewer)
+
+    ARROWS = {"x": (235, 70, 60), "y": (70, 190, 70), "z": (70, 120, 245)}
+
+    def arrow(self, viewer, axis):
+        """The pixels of an arrow of the clicked object."""
+        def found():
+            width = viewer.size()[0]
+            pixels = struct.iter_unpack("3B", self.screen(viewer))
+            places = [(i % width, i // width) for i, p in enumerate(pixels) if p == self.ARROWS[axis]]
+            return places if len(places) > 20 else None
+
+        return wait_until(f"the arrow {axis}", found)
+
+    def test_an_arrow_of_the_clicked_object_is_dragged(self):
+        viewer = self.open(self.file("lit"), size="960x540")
+        viewer.press("BackSpace")
+        self.object_in(viewer)
+        viewer.press("BackSpace")  # the arrows are shown with the panels
+        viewer.still(4)
+        for number, axis in enumerate("xy"):  # that of z hides a part of y's
+            centre = max(self.arrow(viewer, "z"), key=lambda p: p[1])
+            pixels = self.arrow(viewer, axis)
+            middle = [sum(p[i] for p in pixels) / len(pixels) for i in range(2)]
+            start = min(pixels, key=lambda p: (p[0] - middle[0]) ** 2 + (p[1] - middle[1]) ** 2)
+            viewer.drag(start, (2 * start[0] - centre[0], 2 * start[1] - centre[1]))
+            viewer.still(2)
+            command = viewer.screenshot()[0]
+            self.assertIn("--keys", command, axis)
+            with open(os.path.join(self.folder, command[command.index("--keys") + 1]), encoding="utf-8") as file:
+                moved = json.load(file)["instances"][0]["keys"][0]["translate"]
+            self.assertEqual([by != 0 for by in moved], [other == number for other in range(3)], axis)
+            viewer.press("b")
+            viewer.still(4)
+        self.end(viewer)
+
+    def object_in(self, viewer):
+        """Clicks until an object is picked that can be moved. Returns where."""
+        width, height = viewer.size()
+        for y in (0.5, 0.56, 0.45, 0.6):
+            for x in (0.5, 0.47, 0.53, 0.42, 0.6):
+                at = round(width * x), round(height * y)
+                pick = viewer.pick(*at)[0]
+                if pick["hit"] and pick.get("surface", {}).get("instance_name", "") in self.OBJECTS:
+                    return at
+        self.fail("no object in the picture")
+
+    OBJECTS = {"letter"}
 
     def test_orbit_pause_and_motion(self):
         viewer = self.open(self.file("moving"))
@@ -132,9 +226,9 @@ class Keys(WindowTest):
         colorful = lambda: any(max(p) - min(p) > 8 for p in struct.iter_unpack("3B", self.screen(viewer)))
         self.assertTrue(any(max(p) - min(p) > 8 for p in struct.iter_unpack("3B", with_panels)))
         wait_until("the panels to go", lambda: not colorful())
-        viewer.press("h")
+        viewer.press("i")
         wait_until("the help", colorful)
-        viewer.press("h")
+        viewer.press("i")
         wait_until("the help to go", lambda: not colorful())
         viewer.press("alt+Return")
         wait_until("full screen", lambda: viewer.size() == (self.display.WIDTH, self.display.HEIGHT))

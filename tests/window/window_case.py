@@ -26,6 +26,7 @@ class WindowTest(unittest.TestCase):
         for name, source in {"room": "room/room.pbrt", "textured": "textured/textured.pbrt",
                              "moving": "features/animated_transform.pbrt"}.items():
             subprocess.run([cls.program, "bake", os.path.join(cls.sources, "assets", source), "-o", os.path.join(cls.baked, name + ".ptk"), "-q"], check=True)
+        subprocess.run([cls.program, "bake", os.path.join(cls.sources, "assets", "features/instances.pbrt"), "-o", os.path.join(cls.baked, "lit.ptk"), "--for", "shading", "-q"], check=True)
 
     @classmethod
     def tearDownClass(cls):

@@ -1,6 +1,7 @@
 #include "runtime/view/window/panels.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 #include <fmt/format.h>
@@ -307,12 +308,37 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
     ImGui::SameLine();
     if (ImGui::Button("Save settings")) frames.post(actions.save_settings);
     ImGui::SameLine();
-    if (ImGui::Button("Help (H)")) help = !help;
+    if (ImGui::Button("Help (I)")) help = !help;
     text_line(fmt::format("speed {:.3g} units per second{}{}{}{}", shown.speed, shown.orbits ? ", orbit" : "",
-                          shown.plays ? ", plays" : "", shown.lights_turn ? ", lights turn" : "", shown.paused ? ", paused" : ""));
+                          shown.plays ? ", plays" : "", shown.lights_turn ? ", lights turn" : "",
+                          shown.paused ? ", paused" : ""));
     if (shown.recording) ImGui::TextColored({1.0f, 0.4f, 0.3f, 1.0f}, "recording the camera");
   }
   ImGui::End();
+}
+
+void draw_gizmo(const Gizmo& gizmo, std::optional<size_t> held) {
+  static constexpr std::array<ImU32, 3> kColors{IM_COL32(235, 70, 60, 255), IM_COL32(70, 190, 70, 255),
+                                                IM_COL32(70, 120, 245, 255)};
+  static constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  const auto at = [&](glm::dvec2 p) {
+    return ImVec2(static_cast<float>(p.x) * screen.x, static_cast<float>(p.y) * screen.y);
+  };
+  ImDrawList* const back = ImGui::GetBackgroundDrawList();
+  const ImVec2 centre = at(gizmo.centre);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (!gizmo.tips[axis]) continue;
+    const ImVec2 tip = at(*gizmo.tips[axis]);
+    const float dx = tip.x - centre.x, dy = tip.y - centre.y, length = std::max(std::hypot(dx, dy), 1e-3f);
+    const float ux = dx / length, uy = dy / length, head = std::min(10.0f, length);
+    const ImVec2 neck(tip.x - head * ux, tip.y - head * uy);
+    back->AddLine(centre, neck, kColors[axis], held == axis ? 5.0f : 3.0f);
+    back->AddTriangleFilled(tip, {neck.x - 0.5f * head * uy, neck.y + 0.5f * head * ux},
+                            {neck.x + 0.5f * head * uy, neck.y - 0.5f * head * ux}, kColors[axis]);
+    back->AddText({tip.x + 8.0f * ux - 3.0f, tip.y + 10.0f * uy - 6.0f}, kColors[axis], kNames[axis]);
+  }
+  back->AddCircleFilled(centre, 4.0f, IM_COL32(255, 255, 255, 255));
 }
 
 void draw_loading(const std::string& file, const std::pair<std::string, double>& loading) {

@@ -14,6 +14,10 @@ namespace packtrace {
 /// @param loading FrameThread::loading()
 void draw_loading(const std::string& file, const std::pair<std::string, double>& loading);
 
+/// Draws the arrows of the picked instance over the picture.
+/// @param held the arrow that is being dragged
+void draw_gizmo(const Gizmo& gizmo, std::optional<size_t> held);
+
 /// The panels over the picture: views and settings, times, pick, help.
 class Panels {
 public:

@@ -22,6 +22,8 @@ namespace {
 constexpr double kWaitSeconds = 1.0 / 120.0; ///< between looks at the frame thread without input
 constexpr double kDoubleClickSeconds = 0.3;
 constexpr double kClickPixels = 3.0;   ///< a press that moves farther is a drag
+constexpr double kArrowPixels = 8.0;   ///< distance at which a press takes an arrow
+constexpr double kArrowStart = 0.2;    ///< part of an arrow at the centre that cannot be taken: all three meet there
 constexpr double kDividerPixels = 6.0; ///< distance at which a press takes the divider
 
 std::string& last_glfw_error() {
@@ -56,9 +58,9 @@ std::string key_name(int key) {
   return {};
 }
 
-/// Whether a key moves the camera while it is down.
-bool flies(const std::string& key) {
-  return key.size() == 1 && std::string_view("wasdqe").find(key) != std::string_view::npos;
+/// Whether a key moves something while it is down.
+bool moves(const std::string& key) {
+  return key.size() == 1 && std::string_view("wasdqeuyjmhk").find(key) != std::string_view::npos;
 }
 
 /// The texture that holds the picture.
@@ -108,6 +110,7 @@ struct ViewerWindow::State {
   std::vector<InputEvent> input;
   std::optional<MouseButton> dragged;
   bool moves_divider = false;
+  std::optional<size_t> moved_axis; ///< of the gizmo
   double mouse_x = 0, mouse_y = 0, pressed_x = 0, pressed_y = 0, gone = 0, clicked_s = -1;
   int left = 0, top = 0, width = 0, height = 0; ///< of the window before full screen
 
@@ -122,6 +125,8 @@ struct ViewerWindow::State {
   void take_snapshot();
   void draw();
   std::optional<std::array<uint32_t, 2>> pixel() const;
+  std::optional<size_t> axis_under_mouse() const;
+  void drag_axis(size_t axis, double dx, double dy);
 };
 
 void ViewerWindow::State::request(ViewRequest asked) {
@@ -164,7 +169,7 @@ void ViewerWindow::State::key(int code, int action, int mods) {
   if (const ViewRequest asked = view_request(name); asked != ViewRequest::kNone) return request(asked);
   const bool ctrl = (mods & GLFW_MOD_CONTROL) != 0;
   frames->post([name, ctrl](ViewSession&, ViewControls& controls) { controls.press(name, ctrl); },
-               flies(name) ? FrameThread::Urgency::kMoves : FrameThread::Urgency::kAfterFrame);
+               moves(name) ? FrameThread::Urgency::kMoves : FrameThread::Urgency::kAfterFrame);
 }
 
 std::optional<std::array<uint32_t, 2>> ViewerWindow::State::pixel() const {
@@ -187,6 +192,7 @@ void ViewerWindow::State::click(double time_s) {
       session.set_pivot((*at)[0], (*at)[1]);
     else {
       const size_t pane = session.pane_at((*at)[0]);
+      session.select(pane, (*at)[0], (*at)[1]);
       picked(session, pane, session.pick(pane, (*at)[0], (*at)[1]));
     }
   });
@@ -194,9 +200,10 @@ void ViewerWindow::State::click(double time_s) {
 
 void ViewerWindow::State::button(int code, int action, double time_s) {
   if (action == GLFW_RELEASE) {
-    const bool clicked = dragged == MouseButton::kLeft && !moves_divider && gone < kClickPixels;
+    const bool clicked = dragged == MouseButton::kLeft && !moves_divider && !moved_axis && gone < kClickPixels;
     dragged.reset();
     moves_divider = false;
+    moved_axis.reset();
     if (clicked) click(time_s);
     return;
   }
@@ -209,6 +216,7 @@ void ViewerWindow::State::button(int code, int action, double time_s) {
   glfwGetWindowSize(window, &window_width, nullptr);
   moves_divider = dragged == MouseButton::kLeft && shown && shown->split == SplitMode::kDivider &&
                   std::abs(mouse_x - shown->divider * window_width) < kDividerPixels;
+  if (dragged == MouseButton::kLeft && !moves_divider && panels.shown) moved_axis = axis_under_mouse();
 }
 
 void ViewerWindow::State::mouse(double x, double y) {
@@ -224,11 +232,42 @@ void ViewerWindow::State::mouse(double x, double y) {
     frames->post([at = x / window_width](ViewSession& session, ViewControls&) { session.set_divider(at); });
     return;
   }
+  if (moved_axis) {
+    drag_axis(*moved_axis, before < kClickPixels ? x - pressed_x : dx, before < kClickPixels ? y - pressed_y : dy);
+    return;
+  }
   // The first step makes up for the pixels after which a press became a drag.
   const double step_x = before < kClickPixels ? x - pressed_x : dx, step_y = before < kClickPixels ? y - pressed_y : dy;
   frames->post(
       [b = *dragged, step_x, step_y](ViewSession&, ViewControls& controls) { controls.drag(b, step_x, step_y); },
       FrameThread::Urgency::kMoves);
+}
+
+/// The arrow of the gizmo under the mouse.
+std::optional<size_t> ViewerWindow::State::axis_under_mouse() const {
+  if (!shown || !shown->gizmo) return std::nullopt;
+  int window_width = 1, window_height = 1;
+  glfwGetWindowSize(window, &window_width, &window_height);
+  const glm::dvec2 scale(window_width, window_height), centre = shown->gizmo->centre * scale;
+  std::optional<size_t> nearest;
+  double nearest_px = kArrowPixels;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (!shown->gizmo->tips[axis]) continue;
+    const glm::dvec2 arrow = *shown->gizmo->tips[axis] * scale - centre, mouse = glm::dvec2(mouse_x, mouse_y) - centre;
+    const double length2 = std::max(glm::dot(arrow, arrow), 1e-9);
+    const double along = std::clamp(glm::dot(mouse, arrow) / length2, 0.0, 1.0);
+    const double away_px = glm::length(mouse - along * arrow);
+    if (along > kArrowStart && away_px < nearest_px) nearest_px = away_px, nearest = axis;
+  }
+  return nearest;
+}
+
+void ViewerWindow::State::drag_axis(size_t axis, double dx, double dy) {
+  int window_width = 1, window_height = 1;
+  glfwGetWindowSize(window, &window_width, &window_height);
+  const glm::dvec2 by(dx / std::max(window_width, 1), dy / std::max(window_height, 1));
+  frames->post([axis, by](ViewSession& session, ViewControls&) { session.drag_gizmo(axis, by); },
+               FrameThread::Urgency::kMoves);
 }
 
 void ViewerWindow::State::handle_input() {
@@ -296,6 +335,7 @@ void ViewerWindow::State::draw() {
       const float x = std::round(static_cast<float>(shown->divider) * screen.x);
       back->AddLine({x, 0}, {x, screen.y}, IM_COL32(255, 160, 40, 255), 2.0f);
     }
+    if (shown->gizmo && panels.shown) draw_gizmo(*shown->gizmo, moved_axis);
     frames->set_pick(panels.shown && !ImGui::GetIO().WantCaptureMouse && !dragged ? pixel() : std::nullopt);
     panels.draw(*shown, *frames, *actions);
   } else {

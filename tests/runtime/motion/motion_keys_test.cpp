@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/motion/displacements.h"
 #include "runtime/motion/motion_keys.h"
 #include "runtime/motion/scene_motion.h"
 #include "tests/runtime/motion/moving_scenes.h"
@@ -55,6 +56,23 @@ TEST_F(MotionKeys, ANameAddressesAllAndANumberOne) {
   EXPECT_EQ(motion.instances[0].pivot, Vec3(10, 1, 0)); // the centre of the box
   EXPECT_TRUE(motion.tracks[0].loop);
   EXPECT_EQ(read(R"({"instances": [{"name": "tree", "keys": [{"time": 0}]}]})").instances.size(), 3u);
+}
+
+TEST_F(MotionKeys, DisplacementsAreWhatTheirKeysSay) {
+  targets_.instances.push_back({"a \"b\" \\", Affine(1.0f), {}, false});
+  const std::vector<Displacement> moved{{1, {0.1, -2e-7, 1e20}}, {2, {0, 0, 0}}, {4, {1.0 / 3.0, 0, 0}}};
+  const RigidMotion expected = displacement_motion(moved, targets_),
+                    read_back = read(displacement_keys(moved, targets_));
+  ASSERT_EQ(read_back.instances.size(), moved.size());
+  for (size_t i = 0; i < moved.size(); ++i) {
+    EXPECT_EQ(read_back.instances[i].instance, moved[i].instance);
+    EXPECT_EQ(read_back.instances[i].pivot, expected.instances[i].pivot);
+    const MotionKey &key = read_back.tracks[read_back.instances[i].track].keys.at(0),
+                    &wanted = expected.tracks[expected.instances[i].track].keys.at(0);
+    EXPECT_EQ(key.translation, wanted.translation);
+    EXPECT_EQ(key.rotation, wanted.rotation);
+    EXPECT_EQ(key.scale, wanted.scale);
+  }
 }
 
 TEST_F(MotionKeys, KeysMoveRelativeToThePlacement) {

@@ -54,6 +54,7 @@ TEST(Script, ActionsRunInTheirOrder) {
 TEST(Script, EveryActionHasAnExampleThatWorks) {
   RecordingHost host;
   EXPECT_EQ(failure_of(
+                "{\"select\": [24, 16]}\n{\"move\": [0, 1, 0]}\n{\"keys\": \"moved.json\"}\n{\"move\": null}\n"
                 "{\"view\": \"depth\", \"pane\": 1}\n{\"set\": {\"ao.lambda\": 3, \"jitter\": false}}\n"
                 "{\"set\": {\"ao-rate\": \"checkerboard\"}, \"pane\": 1}\n{\"file\": 0, \"pane\": 1}\n"
                 "{\"split\": \"divider\", \"divider\": 0.3}\n{\"size\": [20, 10]}\n{\"quality\": 2}\n"
@@ -94,6 +95,11 @@ TEST(Script, MistakesAreNamedWithLineFieldAndNearestName) {
       {"{\"record\": \"a.json\"}", "a.jsonl:1: record: nothing was recorded"},
       {"{\"key\": \"c\"}\n{\"still\": 2}", "a.jsonl:2: still: something moves on its own"},
       {"{\"time\": 1}", "a.jsonl:1: time: nothing moves in ball.pbrt"},
+      {"{\"select\": [24, 0]}", "a.jsonl:1: select: this pixel shows nothing"},
+      {"{\"move\": [0, 1, 0]}", "a.jsonl:1: move: nothing is picked"},
+      {"{\"select\": [24, 30]}\n{\"move\": [0, 1, 0]}", "a.jsonl:2: move: \"quad\" is part of the world's geometry"},
+      {"{\"keys\": \"a.json\"}", "a.jsonl:1: keys: nothing was moved"},
+      {"{\"view\": \"pbr\"}", "a.jsonl:1: view: pbr: ball.pbrt holds no materials and lights"},
       {"{\"file\": 3}", "a.jsonl:1: file: there is no file 3"},
   };
   for (const auto& [script, message] : cases) {

@@ -13,11 +13,21 @@ namespace packtrace::test {
 /// A floor and a ball with a camera, as a file of a view.
 class ViewBench {
 public:
-  ViewBench() {
+  /// @param shading the scene has a light
+  explicit ViewBench(bool shading = false) {
     add_shape(scene_, quad(Vec3(-4, 0, -4), Vec3(0, 0, 8), Vec3(8, 0, 0)));
     add_shape(scene_, sphere(Vec3(0, 1, 0), 1.0f, 24));
     scene_.cameras.push_back(camera());
+    if (shading) {
+      scene_.has_shading = true;
+      Light sun;
+      sun.kind = LightKind::kDistant, sun.direction = glm::normalize(Vec3(1, 1, -1));
+      scene_.lights.push_back(sun);
+    }
     source_ = std::make_unique<FloatSource>(scene_);
+    motion_ = SceneMotion::of(scene_);
+    targets_ = motion_targets(scene_);
+    targets_.instances[0].fixed = true; // as the ground of a file
   }
 
   static Camera camera() { return camera_at(DVec3(0.5, 2, -6), DVec3(0, 1, 0), 50.0); }
@@ -26,6 +36,8 @@ public:
     view.name = name;
     view.owner = std::make_shared<int>(0);
     view.at_rest.source = view.moving.source = source_.get();
+    view.motion = &motion_;
+    view.targets = [this]() -> const MotionTargets& { return targets_; };
     view.material_names.assign(source_->materials().size(), "chalk");
     return view;
   }
@@ -41,10 +53,14 @@ public:
     return {std::move(shown), ViewCamera(camera(), DVec3(0), DVec3(0, 1, 0), 6.0), config()};
   }
   const FloatSource& source() const { return *source_; }
+  const SceneMotion& motion() const { return motion_; }
+  const MotionTargets& targets() const { return targets_; }
 
 private:
   Scene scene_;
   std::unique_ptr<FloatSource> source_;
+  SceneMotion motion_;
+  MotionTargets targets_;
 };
 
 inline void step(ViewSession& session, uint32_t frames) {

@@ -12,6 +12,8 @@ using test::ViewBench;
 
 class ControlsBench {
 public:
+  explicit ControlsBench(bool shading = false) : bench(shading) {}
+
   ViewBench bench;
   ViewSession session = bench.session();
   ViewControls controls{session};
@@ -49,10 +51,65 @@ TEST(ViewControls, ViewKeysChooseLayers) {
   EXPECT_EQ(layer_after("3"), "shaded");
   EXPECT_EQ(layer_after("enter"), "albedo");
   EXPECT_EQ(layer_after("enter"), "shaded");
-  const size_t views = view_layer_names().size() - 5; // two need levels, three the packed tracer
+  const size_t views = view_layer_names().size() - 9; // two need levels, three the packed tracer, four lights
   b.controls.press("2");
   for (size_t i = 0; i < views; ++i) b.controls.press("tab");
   EXPECT_EQ(b.session.pane(0).layer, "ao");
+}
+
+TEST(ViewControls, ScenesWithLightsAreShaded) {
+  ControlsBench b(true);
+  b.controls.press("3");
+  EXPECT_EQ(b.session.pane(0).layer, "pbr+ao");
+  b.controls.press("enter");
+  EXPECT_EQ(b.session.pane(0).layer, "pbr");
+  b.controls.press("enter");
+  EXPECT_EQ(b.session.pane(0).layer, "pbr+ao");
+}
+
+TEST(ViewControls, LightsTurnUntilTheyArePaused) {
+  ControlsBench b(true);
+  b.controls.press("3");
+  b.controls.press("l");
+  EXPECT_TRUE(b.controls.busy());
+  b.controls.advance(1.0);
+  const float turned = b.session.pane(0).config.shade.light_turn;
+  EXPECT_GT(turned, 0.0f);
+  b.controls.press("space");
+  EXPECT_FALSE(b.controls.busy());
+  b.controls.advance(1.0);
+  EXPECT_EQ(b.session.pane(0).config.shade.light_turn, turned);
+  b.controls.press("space");
+  for (int i = 0; i < 12; ++i) b.controls.advance(1.0);
+  EXPECT_LT(b.session.pane(0).config.shade.light_turn, 360.0f) << "a full turn begins again";
+}
+
+TEST(ViewControls, KeysMoveThePickedObject) {
+  ControlsBench b;
+  EXPECT_THROW(b.controls.press("u"), Error) << "nothing is picked";
+  test::step(b.session, 1);
+  b.session.select(0, 24, 30);
+  EXPECT_THROW(b.controls.press("u"), Error) << "the ground";
+  EXPECT_FALSE(b.controls.busy());
+  b.session.select(0, 24, 16);
+  const DVec3 start(0, 1, 0);
+  const auto place = [&] { return b.session.hand_moves(0).centre(b.bench.file(), 1, 0.0); };
+  const std::pair<const char*, DVec3> keys[] = {{"u", {0, 1, 0}},  {"j", {0, 0, 1}},  {"k", {1, 0, 0}},
+                                                {"y", {0, -1, 0}}, {"m", {0, 0, -1}}, {"h", {-1, 0, 0}}};
+  for (const auto& [key, direction] : keys) {
+    const DVec3 before = b.session.hand_moves(0).empty() ? start : place();
+    b.controls.press(key);
+    EXPECT_TRUE(b.controls.busy());
+    b.controls.advance(0.5);
+    b.controls.release(key);
+    const DVec3 gone = place() - before;
+    EXPECT_NEAR(glm::length(gone), 0.5 * b.controls.speed(), 1e-4) << key;
+    EXPECT_GT(glm::dot(glm::normalize(gone), direction), 0.9) << key;
+  }
+  b.controls.press("u");
+  b.controls.advance(1.0);
+  b.controls.press("b");
+  EXPECT_TRUE(b.session.hand_moves(0).empty());
 }
 
 TEST(ViewControls, TheShortRayKeyGoesBackToTheRadiusBefore) {

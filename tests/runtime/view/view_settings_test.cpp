@@ -42,12 +42,25 @@ TEST(ViewSettings, ChangesAreStatedAsOptionsOfRender) {
   set_view_setting(config, "jitter", "off");
   set_view_setting(config, "supersample", "2");
   set_view_setting(config, "seed", "7");
-  const std::vector<std::string> words{"--supersample", "2", "--no-jitter", "--ao-rate",  "checkerboard",
-                                       "--seed",        "7", "--ao-set",    "lambda=3.5", "--denoiser-set",
-                                       "window=5"};
+  set_view_setting(config, "exposure", "-1");
+  set_view_setting(config, "tone-map", "aces");
+  set_view_setting(config, "shade.depth", "5");
+  const std::vector<std::string> words{
+      "--supersample", "2",          "--no-jitter", "--exposure",  "-1",         "--ao-rate",
+      "checkerboard",  "--seed",     "7",           "--ao-set",    "lambda=3.5", "--denoiser-set",
+      "window=5",      "--tone-map", "aces",        "--shade-set", "depth=5"};
   EXPECT_EQ(setting_words(config), words);
   EXPECT_FALSE(same_frames(config, FrameConfig()));
   EXPECT_EQ(find(view_settings(config), "ao.lambda").value, "3.5");
+}
+
+TEST(ViewSettings, ExposureChangesNoFrame) {
+  FrameConfig config;
+  set_view_setting(config, "exposure", "2");
+  set_view_setting(config, "tone-map", "aces");
+  EXPECT_TRUE(same_frames(config, FrameConfig()));
+  set_view_setting(config, "shade.samples", "2");
+  EXPECT_FALSE(same_frames(config, FrameConfig()));
 }
 
 TEST(ViewSettings, WrongNamesAndValuesAreExplained) {
