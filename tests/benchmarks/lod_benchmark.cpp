@@ -5,6 +5,7 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -20,9 +21,11 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/progress.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/lod_benchmark_newest.h"
 #include "tests/benchmarks/lod_benchmark_simplifiers.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 #include "tests/benchmarks/packing_benchmark_mesh.h"
+#include "tests/compress/lod/lod_class_meshes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/lod/surface_distance.h"
 
@@ -38,6 +41,8 @@ struct Options {
   size_t samples = 500'000;
   bool simplifiers = true;
   bool levels = true;
+  std::vector<std::string> classes; ///< or names of their meshes
+  fs::path newest;                  ///< node_modules/meshoptimizer; empty: left out
 };
 
 struct Times {
@@ -264,15 +269,20 @@ Json measure_simplifiers(const test::BuiltLod& built, const Options& options) {
   const double size = diagonal(base.positions);
   struct Simplifier {
     const char* name;
-    SimplifierResult (*run)(const BareMesh&, uint32_t);
+    std::function<SimplifierResult(const BareMesh&, uint32_t)> run;
   };
+  std::vector<Simplifier> simplifiers = {{"packtrace", simplify_with_packtrace},
+                                         {"meshoptimizer", simplify_with_meshoptimizer},
+                                         {"OpenMesh", simplify_with_openmesh}};
+  if (!options.newest.empty())
+    simplifiers.push_back({"meshoptimizer, newest", [&](const BareMesh& mesh, uint32_t target) {
+                             return simplify_with_newest_meshoptimizer(mesh, target, options.newest);
+                           }});
   Json rows = Json::array();
   fmt::print("\n| the whole mesh, one thread | kept | triangles | rms (% of diagonal) | largest | Mtri/s "
              "|\n|---|---|---|---|---|---|\n");
   for (const double kept : {0.5, 0.1, 0.01})
-    for (const Simplifier& s :
-         {Simplifier{"packtrace", simplify_with_packtrace}, Simplifier{"meshoptimizer", simplify_with_meshoptimizer},
-          Simplifier{"OpenMesh", simplify_with_openmesh}}) {
+    for (const Simplifier& s : simplifiers) {
       const auto target = static_cast<uint32_t>(kept * static_cast<double>(base.triangles.size()));
       const SimplifierResult r = s.run(base, target);
       if (r.mesh.triangles.empty()) {
@@ -281,7 +291,7 @@ Json measure_simplifiers(const test::BuiltLod& built, const Options& options) {
       }
       const Distance d =
           between(base, to_base, r.mesh, SurfaceDistance(r.mesh.positions, r.mesh.triangles), options.samples);
-      const double speed = static_cast<double>(base.triangles.size()) / r.seconds * 1e-6;
+      const double speed = r.seconds > 0.0 ? static_cast<double>(base.triangles.size()) / r.seconds * 1e-6 : 0.0;
       fmt::print("| {} | {} % | {}{} | {:.5f} | {:.4f} | {:.2f} |\n", s.name, 100 * kept, r.mesh.triangles.size(),
                  r.lost_triangles > 0 ? fmt::format(" ({} not taken)", r.lost_triangles) : "", 100 * d.rms / size,
                  100 * d.max / size, speed);
@@ -326,13 +336,30 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("!--levels-only", options.simplifiers, "leaves the other programs' simplifiers out");
   app.add_flag("!--times-only", options.levels, "only builds, and measures no distance");
+  std::vector<std::string> class_names = {"all"};
+  for (const test::ClassMesh& mesh : test::class_meshes())
+    class_names.push_back(mesh.of_class), class_names.push_back(mesh.name);
+  app.add_option("--class", options.classes,
+                 "measures generated meshes of a class that is hard to simplify, or one of them")
+      ->check(CLI::IsMember(class_names));
+  app.add_option("--newest-meshoptimizer", options.newest,
+                 "folder of the npm package (node_modules/meshoptimizer), to compare with it too; needs node")
+      ->check(CLI::ExistingDirectory);
   app.add_option("--json", options.json_file, "writes all figures here");
   if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
-  options.inputs.choose();
+  if (options.classes.empty() || !options.inputs.names.empty()) options.inputs.choose();
   FiguresFile figures(options.json_file);
   Json json = describe_machine();
   for (const std::string& name : options.inputs.names)
     json["inputs"].push_back(measure_input(name, weld_positions(options.inputs.find(name).mesh), options));
+  for (const test::ClassMesh& mesh : test::class_meshes()) {
+    const auto is_wanted = [&](const std::string& name) {
+      return name == "all" || name == mesh.of_class || name == mesh.name;
+    };
+    if (std::ranges::none_of(options.classes, is_wanted)) continue;
+    json["inputs"].push_back(measure_input(mesh.name, weld_positions(mesh.make()), options));
+    json["inputs"].back()["class"] = mesh.of_class;
+  }
   figures.write(json);
   for (const Json& input : json["inputs"]) {
     if (input.value("largest_group_excess", 0.0) > 1e-9)

@@ -12,6 +12,7 @@
 #include "compress/bake/lod/bound/triangle_distance.h"
 #include "compress/bake/lod/loose_pieces.h"
 #include "compress/bake/lod/simplify/quadric.h"
+#include "tests/compress/lod/lod_class_meshes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
 
@@ -88,6 +89,21 @@ TEST(Simplify, AFlatPlaneStaysFlatAndWhole) {
                                    mesh.points[t.points.z] - mesh.points[t.points.x]));
   }
   EXPECT_DOUBLE_EQ(area, 2.0 * 3200.0 * 3200.0);
+}
+
+/// Flat faces must not use up triangles that rims need.
+TEST(Simplify, AThinPlateStaysExact) {
+  for (const double thickness : {1e-2, 1e-3}) {
+    SimplifyMesh mesh = whole_number_mesh(plate_mesh(40, thickness, 0.0), 1e5);
+    const std::vector<DVec3> points = mesh.points;
+    const std::vector<LodTriangle> triangles = mesh.triangles;
+    simplify(mesh, to(100));
+    EXPECT_LE(mesh.triangles.size(), 100u);
+    bound_errors(points, triangles, mesh);
+    double largest = 0.0;
+    for (const LodTriangle& t : mesh.triangles) largest = std::max(largest, t.error);
+    EXPECT_LE(largest, 2.0) << "thickness " << thickness; // rounding moves the points of sides that are not whole
+  }
 }
 
 /// Maximum distance of the points from the mesh's surface.

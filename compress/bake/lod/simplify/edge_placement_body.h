@@ -37,7 +37,7 @@ struct Vec4 {
 [[gnu::always_inline]] inline void minimise(const Quadric4& q, Vec4& p) {
   const Lanes zero = {}, one = zero + 1.0;
   const Lanes trace = q.xx + q.yy + q.zz;
-  const Lanes stay = 1e-4 * trace;              // regularises directions of low curvature
+  const Lanes stay = 1e-7 * trace;              // regularises directions of low curvature
   const Lanes safe = trace > zero ? zero : one; // for quadrics that are 0
   // L D L^T = A + stay I
   const Lanes d0 = one / (q.xx + stay + safe), l10 = q.xy * d0, l20 = q.xz * d0;

@@ -168,7 +168,7 @@ private:
     const EdgeEnds e = surface_.ends[edge];
     const EdgePlacement& p = placements_[edge];
     const DVec3 point(p.at[0], p.at[1], p.at[2]);
-    if (!gather_star(e.a, e.b) || (!may_tear_ && disconnects(e.a, e.b)) || folds_over(point))
+    if (!gather_star(e.a, e.b) || disconnects(e.a, e.b) || folds_over(point))
       rejected_.push_back(edge);
     else
       collapse(e.a, e.b, point, p.along);
@@ -195,12 +195,14 @@ private:
   }
 
   /// Whether the collapse would remove the only triangle that connects its third point to the edge. The quadrics do not
-  /// measure what the surface loses there, so this is allowed only when no other edge can collapse.
+  /// measure what the surface loses there, so this is allowed only when no other edge can collapse, and never if that
+  /// point and an end are locked: the edge between them stays.
   bool disconnects(uint32_t a, uint32_t b) {
     for (const uint32_t triangle : removed_)
       for (uint32_t corner = 4 * triangle; corner < 4 * triangle + 3; ++corner) {
         const uint32_t point = corners_.point(corner);
         if (point == a || point == b) continue;
+        if (may_tear_ && (m_.locked[point] == 0 || (m_.locked[a] == 0 && m_.locked[b] == 0))) continue;
         bool held = false;
         corners_.for_each(point, [&](uint32_t other) {
           const uint32_t next = corners_.point(CornerLists::next_corner(other));

@@ -13,9 +13,12 @@ constexpr uint32_t kNone = ~0u;
 constexpr double kBorderWeight = 8.0;  // of border planes, relative to triangle planes
 constexpr double kSeamWeight = 2.0;    // at material seams
 constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates are discontinuous
+constexpr double kSharp = 0.3;         // maximum cosine between the triangles of a sharp edge
+constexpr double kSharpWeight = 0.25;  // keeps the outline of thin plates, whose rims have hardly any area
 constexpr double kFolded = 0.9999;     // minimum cosine between the layers of a sheet
-// of the point's own position: on flat parts, collapses short edges first and avoids long triangles
-constexpr double kStayWeight = 1e-4;
+// of the point's own position: on flat parts, collapses short edges first and avoids long triangles. 1e-4 of an edge's
+// length counts as much as that distance from the surface.
+constexpr double kStayWeight = 1e-8;
 
 /// An edge under construction.
 struct EdgeUse {
@@ -23,6 +26,8 @@ struct EdgeUse {
   uint32_t triangle; ///< the first triangle at the edge
   bool forward;      ///< whether that triangle runs from the lower-numbered point
   bool border = true, seam = false, crease = false;
+  bool two = false;   ///< at least two triangles use it
+  bool sharp = false; ///< exactly two use it, and the surface turns sharply there
 };
 
 class EdgeFinder {
@@ -103,6 +108,8 @@ private:
       out_.ends.push_back({a, b});
     } else {
       uses_[found].border = uses_[found].border && folds_back(uses_[found], triangle, p == a);
+      uses_[found].sharp = !uses_[found].two && is_sharp(uses_[found], triangle, p == a);
+      uses_[found].two = true;
       if (many_seams_) join(found, triangle);
     }
     return found;
@@ -115,6 +122,13 @@ private:
     const double dot = glm::dot(m, n);
     if ((dot > 0.0) != (edge.forward == forward)) return false;
     return dot * dot > kFolded * kFolded * glm::dot(m, m) * glm::dot(n, n);
+  }
+
+  /// Whether the surface turns sharply between the edge's first triangle and this one.
+  bool is_sharp(const EdgeUse& edge, uint32_t triangle, bool forward) const {
+    const DVec3 &m = out_.area_normals[edge.triangle], &n = out_.area_normals[triangle];
+    const double dot = edge.forward == forward ? -glm::dot(m, n) : glm::dot(m, n);
+    return dot < 0.0 || dot * dot < kSharp * kSharp * glm::dot(m, m) * glm::dot(n, n);
   }
 
   /// Marks seams and creases between the edge's first triangle and this one.
@@ -137,7 +151,11 @@ private:
       const EdgeUse& e = uses_[i];
       const auto [a, b] = out_.ends[i];
       if (e.border) out_.points[a].held = out_.points[b].held = kOnBorder;
-      const double weight = e.border ? kBorderWeight : e.seam ? kSeamWeight : e.crease ? kCreaseWeight : 0.0;
+      const double weight = e.border   ? kBorderWeight
+                            : e.sharp  ? kSharpWeight
+                            : e.seam   ? kSeamWeight
+                            : e.crease ? kCreaseWeight
+                                       : 0.0;
       if (weight > 0.0) add_edge_plane(i, weight);
     }
   }
