@@ -10,6 +10,7 @@
 
 #include "runtime/ao/ray_sorter.h"
 #include "runtime/ao/shading_points.h"
+#include "runtime/ao/view_occlusion.h"
 #include "runtime/ao/visibility_curve.h"
 #include "runtime/camera/tiles.h"
 
@@ -223,6 +224,9 @@ uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuf
   ao.ray_length = config.radius;
   ao.stratified = is_stratified(config.sampler);
   ao.samples = least_samples(plan);
+  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer); view && traces_view_occlusion(*view, config, plan))
+    return trace_view_occlusion(*view, tracer.space(), gbuffer, config, ao_radius(config, source.world_bounds()), plan,
+                                ao, progress);
   const AoTracer ao_tracer(source, tracer, gbuffer, config, plan, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
   tbb::enumerable_thread_specific<TileMemory> memory;

@@ -69,6 +69,12 @@ void ShadingPoints::load(const GBuffer& g, const PixelSampler& sampler, const Un
   sampler.pixels(x_px_.data(), y_px_.data(), n, sampled_);
 }
 
+void ShadingPoints::copy_to(std::span<OcclusionPoint> out) const {
+  const auto at = [](const Vectors& v, size_t i) { return Vec3(v.x[i], v.y[i], v.z[i]); };
+  for (size_t i = 0; i < pixel_.size(); ++i)
+    out[i] = {at(origin_, i), at(geometric_, i), at(normal_, i), pixel_[i], x_px_[i], y_px_[i]};
+}
+
 void ShadingPoints::write_rays(const PixelSampler& sampler, std::span<const uint32_t> samples, float tfar,
                                std::span<Ray> rays) {
   const size_t n = rays.size();

@@ -7,6 +7,7 @@
 #include "runtime/ao/sampler.h"
 #include "runtime/camera/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
+#include "runtime/trace/view_tracer.h"
 
 namespace packtrace {
 
@@ -23,6 +24,10 @@ public:
   /// Loads the surfaces of the pixels that were added.
   /// @param offset_scale AoConfig::offset_scale
   void load(const GBuffer& gbuffer, const PixelSampler& sampler, const UnitSpace& space, float offset_scale);
+
+  /// Copies what was loaded, for tracers that make rays themselves.
+  /// @param out count() elements
+  void copy_to(std::span<OcclusionPoint> out) const;
 
   /// Writes the rays of the first rays.size() points. Directions are cosine-weighted about the shading normal; those
   /// below the geometric surface are mirrored to its upper side.

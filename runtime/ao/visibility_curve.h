@@ -41,6 +41,13 @@ public:
   /// Length of the rays (x_end), in radii.
   float end() const { return end_; }
 
+  // The constants of visibility(), for kernels in other languages.
+  float lambda() const { return lambda_; }
+  float darkening() const { return darkening_; }
+  float floor() const { return floor_; }
+  float scale() const { return scale_; }
+  float parabola() const { return parabola_; }
+
   /// @param x hit distance in radii, >= 0
   /// @param luminance luminance of the hit surface's albedo; used only with interreflection
   float visibility(float x, float luminance) const {

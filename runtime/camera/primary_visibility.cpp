@@ -3,18 +3,21 @@
 #include <algorithm>
 #include <limits>
 #include <tuple>
+#include <vector>
 
 #include "runtime/camera/ray_columns.h"
 #include "runtime/camera/surface_motion.h"
 #include "runtime/camera/tiles.h"
 #include "runtime/trace/ray_offset.h"
 #include "runtime/trace/source/albedo_lookup.h"
+#include "runtime/trace/view_tracer.h"
 
 namespace packtrace {
 namespace {
 
 constexpr uint32_t kBlock = 4;                  ///< pixels per axis of a block of coherent rays
 constexpr uint32_t kBatch = kTileSize * kBlock; ///< rays per query: a row of blocks, small enough for the level-1 cache
+constexpr uint32_t kTileRows = kTileSize / kBlock;
 static_assert(kTileSize % kBlock == 0 && kBatch <= kMaxColumnRays);
 
 /// The rays of a row of blocks. Pixels of a block outside the image get rays that hit nothing (tfar < tnear).
@@ -39,6 +42,23 @@ public:
 
   bool sees_motion() const { return motion_.any(); }
 
+  /// Traces all rays of the picture at once; trace_tile() then uses these hits.
+  void trace_view(const ViewTracer& tracer, const Progress& progress) {
+    const ImageSize size = out_.size;
+    const size_t columns = (size.width + kTileSize - 1) / kTileSize, rows = (size.height + kTileSize - 1) / kTileSize;
+    std::vector<Ray> rays(columns * rows * kTileRows * kBatch, Ray{Vec3(0), 0.0f, Vec3(0, 0, 1), -1.0f});
+    Progress quiet;
+    for_each_tile(size, quiet, [&](const Tile& tile) {
+      RayBatch batch;
+      for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) {
+        make_rays(y, tile, batch);
+        std::copy_n(batch.rays, batch.count, &rays[place_of(y, tile)]);
+      }
+    });
+    view_hits_.resize(rays.size());
+    tracer.trace_view(rays, kCameraRays, view_hits_, progress);
+  }
+
   void trace_tile(const Tile& tile) const {
     RayBatch batch;
     for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) trace_row(y, tile, batch);
@@ -47,7 +67,10 @@ public:
 private:
   void trace_row(uint32_t y0, const Tile& tile, RayBatch& batch) const {
     make_rays(y0, tile, batch);
-    tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});
+    if (view_hits_.empty())
+      tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});
+    else
+      std::copy_n(&view_hits_[place_of(y0, tile)], batch.count, batch.hits);
     batch.hit_count = 0;
     for (uint32_t i = 0; i < batch.count; ++i) {
       if (batch.hits[i].valid())
@@ -61,6 +84,13 @@ private:
       if (!batch.hits[i].valid() && batch.columns.x[i] < tile.x1 && batch.columns.y[i] < tile.y1)
         write_miss(pixel_of(i, batch));
     for (uint32_t h = 0; h < batch.hit_count; ++h) write_hit(h, batch);
+  }
+
+  /// Place of a tile's row of blocks in the rays of the whole picture.
+  size_t place_of(uint32_t y0, const Tile& tile) const {
+    const size_t columns = (out_.size.width + kTileSize - 1) / kTileSize;
+    const size_t number = tile.y0 / kTileSize * columns + tile.x0 / kTileSize;
+    return (number * kTileRows + (y0 - tile.y0) / kBlock) * kBatch;
   }
 
   void make_rays(uint32_t y0, const Tile& tile, RayBatch& batch) const {
@@ -187,6 +217,7 @@ private:
   const PrimaryCamera& now_;
   const SurfaceMotion motion_;
   GBuffer& out_;
+  std::vector<RayHit> view_hits_; ///< of trace_view()
 };
 
 } // namespace
@@ -208,9 +239,10 @@ void trace_primary(const SceneSource& source, const RayTracer& tracer, const Pri
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress) {
   if (gbuffer.size != now.size() || gbuffer.view_z.size() != now.size().pixels()) gbuffer.resize(now.size());
   gbuffer.pixel_spread = static_cast<float>(now.pixel_spread());
-  const PrimaryTracer primary(source, tracer, now, previous, gbuffer);
+  PrimaryTracer primary(source, tracer, now, previous, gbuffer);
   gbuffer.previous_z.resize(primary.sees_motion() ? now.size().pixels() : 0);
   progress.begin("primary rays", now.size().pixels());
+  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer)) primary.trace_view(*view, progress);
   for_each_tile(now.size(), progress, [&](const Tile& tile) { primary.trace_tile(tile); });
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
 #include <utility>
 
 #include "pbrt_import/base/error.h"
@@ -14,6 +15,9 @@ namespace {
 constexpr uint32_t kThreads = 64; ///< of a workgroup
 constexpr uint32_t kMaxLanes = 32, kMaxQueueNodes = 1u << 24;
 constexpr uint32_t kFirstBinding = kSceneBindings;
+constexpr uint32_t kMaxSamples = 256; ///< of a point in a dispatch
+/// Of a thread: Mesa's CPU device ends loops after 65,535 iterations of an invocation.
+constexpr uint32_t kMaxNearestSamples = 16;
 
 uint32_t groups_of(uint64_t threads) { return static_cast<uint32_t>((threads + kThreads - 1) / kThreads); }
 
@@ -24,8 +28,10 @@ class TimedDispatches {
 public:
   /// @param rays of the first dispatch; set to what the last one's time suggests
   /// @param rays_per_item rays of a work item
-  TimedDispatches(Device& device, uint64_t& rays, uint64_t rays_per_item, uint64_t most_items)
-      : device_(device), rays_(rays), rays_per_item_(rays_per_item), most_(std::max(most_items, uint64_t{1})) {}
+  TimedDispatches(Device& device, uint64_t& rays, uint64_t rays_per_item, uint64_t most_items,
+                  const std::function<void(double)>& watch)
+      : device_(device), rays_(rays), rays_per_item_(rays_per_item), watch_(watch),
+        most_(std::max(most_items, uint64_t{1})) {}
 
   /// @param run function of the first item and the number of items that returns ms
   template <typename Run>
@@ -35,6 +41,7 @@ public:
       const uint64_t fitting = std::min(rays_ / rays_per_item_, most_);
       const uint64_t wanted = std::max(fitting / granularity, uint64_t{1}) * granularity;
       const uint64_t items = std::min(count - first, wanted);
+      if (watch_) watch_(static_cast<double>(first) / static_cast<double>(count));
       const double ms = run(first, items);
       first += items;
       time.ms += ms, ++time.dispatches;
@@ -50,7 +57,9 @@ public:
 private:
   Device& device_;
   uint64_t& rays_;
-  uint64_t rays_per_item_, most_;
+  uint64_t rays_per_item_;
+  const std::function<void(double)>& watch_;
+  uint64_t most_;
 };
 
 template <typename Record>
@@ -66,11 +75,12 @@ struct DeviceRays::State {
   GpuScene::State& scene;
   std::shared_ptr<Device> device;
   CameraRecord camera{};
-  Buffer cameras, hits, rays, points, counts;
+  std::function<void(double)> watch;
+  Buffer cameras, hits, rays, points, counts, sums;
   uint32_t point_count = 0;
-  std::unique_ptr<Kernel> camera_kernel, points_kernel, rays_kernel, queue_kernel;
-  uint64_t placed = 0;                                    ///< GpuScene::State::placed of the kernels
-  uint64_t camera_rays = 1u << 14, queue_rays = 1u << 14; ///< of the next dispatch
+  std::unique_ptr<Kernel> camera_kernel, points_kernel, rays_kernel, queue_kernel, nearest_kernel;
+  uint64_t placed = 0; ///< GpuScene::State::placed of the kernels
+  uint64_t camera_rays = 1u << 14, queue_rays = 1u << 14, nearest_rays = 1u << 13; ///< of the next dispatch
 
   void make_room(Buffer& buffer, uint64_t bytes, const char* what) {
     if (buffer.bytes() >= bytes) return;
@@ -79,10 +89,13 @@ struct DeviceRays::State {
   }
   uint64_t most_threads() const { return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * kThreads; }
   void make_queue_kernel();
+  template <typename Threads>
+  DeviceTime run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples,
+                     uint64_t& rays_at_once, const Threads& threads);
   /// Drops kernels that were made for other placements.
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
-    camera_kernel.reset(), points_kernel.reset(), rays_kernel.reset(), queue_kernel.reset();
+    camera_kernel.reset(), points_kernel.reset(), rays_kernel.reset(), queue_kernel.reset(), nearest_kernel.reset();
   }
 };
 
@@ -100,7 +113,7 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   if (!s.camera_kernel) s.camera_kernel = s.scene.make_kernel(spirv::camera(), kFirstBinding + 3, sizeof(SpanRecord));
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.camera_kernel->bind(kFirstBinding + i, *buffers[i]);
-  TimedDispatches dispatches(*s.device, s.camera_rays, 1, s.most_threads());
+  TimedDispatches dispatches(*s.device, s.camera_rays, 1, s.most_threads(), s.watch);
   return dispatches.all(uint64_t{blocks_of(camera)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
     const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), baked::kVisibleToCamera,
                           keep_rays ? 1u : 0u};
@@ -128,33 +141,70 @@ void DeviceRays::set_points(std::span<const PointRecord> points) {
   update(s.device, s.points, 0, std::as_bytes(points));
 }
 
+void DeviceRays::set_watch(std::function<void(double share)> watch) { state_->watch = std::move(watch); }
+
+bool DeviceRays::can_count() const {
+  return state_->device->traits().subgroup_size <= kMaxLanes && state_->scene.node_count <= kMaxQueueNodes;
+}
+
 void DeviceRays::State::make_queue_kernel() {
-  const DeviceTraits& traits = device->traits();
-  if (traits.subgroup_size > kMaxLanes || scene.node_count > kMaxQueueNodes)
-    throw Error(ErrorKind::kUnsupported,
-                "backend gpu: the queue kernel needs subgroups of at most 32 lanes and at most "
-                "2^24 nodes");
-  queue_kernel = scene.make_kernel(traits.partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue(),
-                                   kFirstBinding + 2, sizeof(OcclusionRecord));
+  queue_kernel =
+      scene.make_kernel(device->traits().partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue(),
+                        kFirstBinding + 2, sizeof(OcclusionRecord));
+}
+
+/// Runs a kernel for all points, and for at most `most_samples` of their samples at a time.
+/// @param threads function of a number of samples: threads of a point
+template <typename Threads>
+DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples,
+                                      uint64_t& rays_at_once, const Threads& threads) {
+  DeviceTime time;
+  for (uint32_t done = 0; done < samples.sample_count;) {
+    OcclusionRecord part = samples;
+    part.first_sample = samples.first_sample + done;
+    part.sample_count = std::min(samples.sample_count - done, most_samples);
+    const uint32_t per_point = threads(part.sample_count);
+    const std::function<void(double)> watch_part = [&](double share) {
+      if (watch) watch((done + share * part.sample_count) / samples.sample_count);
+    };
+    TimedDispatches dispatches(*device, rays_at_once, part.sample_count, most_threads() / per_point / 2, watch_part);
+    const DeviceTime of_part = dispatches.all(point_count, 2 * kThreads, [&](uint64_t first, uint64_t count) {
+      part.first_point = static_cast<uint32_t>(first), part.point_count = static_cast<uint32_t>(count);
+      return device->run(kernel, push_bytes(part), groups_of((count + 31) / 32 * 32 * per_point));
+    });
+    time.ms += of_part.ms, time.dispatches += of_part.dispatches;
+    time.longest_ms = std::max(time.longest_ms, of_part.longest_ms);
+    done += part.sample_count;
+  }
+  return time;
 }
 
 DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples) {
   State& s = *state_;
+  if (!can_count())
+    throw Error(ErrorKind::kUnsupported,
+                "backend gpu: counting occluded rays needs subgroups of at most 32 lanes and at "
+                "most 2^24 nodes");
   s.follow_scene();
   s.make_room(s.counts, uint64_t{s.point_count} * sizeof(uint32_t), "counts");
   s.device->fill(s.counts, 0);
   if (!s.queue_kernel) s.make_queue_kernel();
   s.queue_kernel->bind(kFirstBinding, s.points);
   s.queue_kernel->bind(kFirstBinding + 1, s.counts);
-  // Items are points times threads of a point; a dispatch gets all threads of its points.
-  const uint32_t slices = (samples.sample_count + samples.per_thread - 1) / samples.per_thread;
-  TimedDispatches dispatches(*s.device, s.queue_rays, samples.sample_count, s.most_threads() / slices / 2);
-  const DeviceTime time = dispatches.all(s.point_count, 2 * kThreads, [&](uint64_t first, uint64_t count) {
-    OcclusionRecord part = samples;
-    part.first_point = static_cast<uint32_t>(first), part.point_count = static_cast<uint32_t>(count);
-    return s.device->run(*s.queue_kernel, push_bytes(part), groups_of((count + 31) / 32 * 32 * slices));
-  });
-  return time;
+  return s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_rays,
+                   [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; });
+}
+
+DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples) {
+  State& s = *state_;
+  s.follow_scene();
+  s.make_room(s.sums, uint64_t{s.point_count} * 2 * sizeof(double), "sums");
+  s.device->fill(s.sums, 0);
+  if (!s.nearest_kernel)
+    s.nearest_kernel = s.scene.make_kernel(spirv::occlusion_nearest(), kFirstBinding + 2, sizeof(OcclusionRecord));
+  s.nearest_kernel->bind(kFirstBinding, s.points);
+  s.nearest_kernel->bind(kFirstBinding + 1, s.sums);
+  return s.run_all(*s.nearest_kernel, samples, kMaxNearestSamples, s.nearest_rays, [](uint32_t) { return 1u; });
 }
 
 uint32_t DeviceRays::point_count() const { return state_->point_count; }
@@ -170,6 +220,10 @@ void DeviceRays::points(std::span<PointRecord> out) const {
 }
 void DeviceRays::counts(std::span<uint32_t> out) const {
   download(state_->device, state_->counts, 0, std::as_writable_bytes(out));
+}
+
+void DeviceRays::sums(std::span<double> out) const {
+  download(state_->device, state_->sums, 0, std::as_writable_bytes(out));
 }
 
 void DeviceRays::occlusion_rays(const OcclusionRecord& samples, std::span<packed::KernelRay> out) {

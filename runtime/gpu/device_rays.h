@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -30,9 +31,16 @@ public:
   /// Uses other points.
   void set_points(std::span<const PointRecord> points);
 
+  /// @param work called before each dispatch with the share of the current call's work that is done; may throw
+  void set_watch(std::function<void(double share)> watch);
+
+  /// Whether the device can run count_occluded(): subgroups of at most 32 lanes, and at most 2^24 nodes.
+  bool can_count() const;
   /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
-  /// Throws Error(kUnsupported) for subgroups of more than 32 lanes and for more than 2^24 nodes.
+  /// Throws Error(kUnsupported) unless can_count().
   DeviceTime count_occluded(const OcclusionRecord& samples);
+  /// Sums visibility and distance of the nearest hits of each point's rays up, in the order of the samples.
+  DeviceTime sum_nearest(const OcclusionRecord& samples);
 
   uint32_t point_count() const;
   /// By pixel, of trace_camera().
@@ -41,6 +49,8 @@ public:
   /// By point.
   void points(std::span<PointRecord> out) const;
   void counts(std::span<uint32_t> out) const;
+  /// By point, of sum_nearest(): visibility and distance, two each.
+  void sums(std::span<double> out) const;
   /// The rays of sample `samples.first_sample`; those of points without a surface hit nothing.
   void occlusion_rays(const OcclusionRecord& samples, std::span<packed::KernelRay> out);
 

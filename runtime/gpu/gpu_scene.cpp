@@ -124,9 +124,11 @@ void GpuScene::State::make_room(uint64_t ray_count, uint64_t result_bytes) {
 /// @param take function of the first ray, the number of rays and their results
 template <typename Take>
 void GpuScene::State::trace(Kernel& kernel, uint32_t& at_once, std::span<const packed::KernelRay> all,
-                            uint32_t ray_class, uint32_t result_bytes, const Take& take) {
+                            uint32_t ray_class, uint32_t result_bytes, const std::function<void()>& between,
+                            const Take& take) {
   const std::lock_guard lock(mutex);
   for (size_t first = 0; first < all.size();) {
+    if (between) between();
     const auto count = static_cast<uint32_t>(std::min<size_t>(all.size() - first, at_once));
     make_room(count, uint64_t{count} * result_bytes);
     std::memcpy(rays.data(), all.data() + first, count * sizeof(packed::KernelRay));
@@ -160,16 +162,16 @@ void GpuScene::replace_placements(const SceneTables& tables) {
   }
 }
 
-void GpuScene::closest(std::span<const packed::KernelRay> rays, uint32_t ray_class,
-                       std::span<packed::KernelHit> hits) const {
-  state_->trace(*state_->closest, state_->rays_at_once[0], rays, ray_class, sizeof(packed::KernelHit),
+void GpuScene::closest(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<packed::KernelHit> hits,
+                       const std::function<void()>& between) const {
+  state_->trace(*state_->closest, state_->rays_at_once[0], rays, ray_class, sizeof(packed::KernelHit), between,
                 [&](size_t first, uint32_t count, const std::byte* results) {
                   std::memcpy(hits.data() + first, results, count * sizeof(packed::KernelHit));
                 });
 }
 
 void GpuScene::any(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<uint8_t> occluded) const {
-  state_->trace(*state_->any, state_->rays_at_once[1], rays, ray_class, sizeof(uint32_t),
+  state_->trace(*state_->any, state_->rays_at_once[1], rays, ray_class, sizeof(uint32_t), {},
                 [&](size_t first, uint32_t count, const std::byte* results) {
                   for (uint32_t i = 0; i < count; ++i)
                     occluded[first + i] = static_cast<uint8_t>(results[i * sizeof(uint32_t)]);

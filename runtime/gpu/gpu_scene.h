@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -40,7 +41,9 @@ public:
   void replace_placements(const SceneTables& tables);
 
   /// Finds nearest hits; see RayTracer::closest_hits().
-  void closest(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<packed::KernelHit> hits) const;
+  /// @param between called before each dispatch; may throw
+  void closest(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<packed::KernelHit> hits,
+               const std::function<void()>& between = {}) const;
   /// Finds any hits; see RayTracer::any_hits().
   void any(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<uint8_t> occluded) const;
 

@@ -44,7 +44,7 @@ struct GpuScene::State {
   void make_room(uint64_t ray_count, uint64_t result_bytes);
   template <typename Take>
   void trace(Kernel& kernel, uint32_t& at_once, std::span<const packed::KernelRay> all, uint32_t ray_class,
-             uint32_t result_bytes, const Take& take);
+             uint32_t result_bytes, const std::function<void()>& between, const Take& take);
 };
 
 } // namespace packtrace::gpu

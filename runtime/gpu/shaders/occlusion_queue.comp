@@ -406,5 +406,5 @@ void main() {
     }
   }
   if (!valid) return;
-  if (slices == 1u) counts[number] = occluded; else if (occluded != 0u) atomicAdd(counts[number], occluded);
+  if (occluded != 0u) atomicAdd(counts[number], occluded);
 }

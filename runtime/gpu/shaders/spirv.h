@@ -13,6 +13,7 @@ std::span<const uint32_t> prepare();
 std::span<const uint32_t> camera();
 std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();
+std::span<const uint32_t> occlusion_nearest();
 std::span<const uint32_t> occlusion_queue();
 /// For devices with DeviceTraits::partitioned.
 std::span<const uint32_t> occlusion_queue_partitioned();

@@ -1,8 +1,20 @@
 #include "runtime/trace/gpu/gpu_tracer.h"
 
+#include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <vector>
 
 namespace packtrace {
+
+static_assert(sizeof(OcclusionPoint) == sizeof(gpu::PointRecord) &&
+              offsetof(OcclusionPoint, up) == offsetof(gpu::PointRecord, up) &&
+              offsetof(OcclusionPoint, normal) == offsetof(gpu::PointRecord, normal) &&
+              offsetof(OcclusionPoint, pixel) == offsetof(gpu::PointRecord, pixel) &&
+              offsetof(OcclusionPoint, x_px) == offsetof(gpu::PointRecord, x_px) &&
+              offsetof(OcclusionPoint, y_px) == offsetof(gpu::PointRecord, y_px));
+static_assert(sizeof(OcclusionSums) == 2 * sizeof(double));
 
 GpuTracer::GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers)
     : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_) {
@@ -16,12 +28,57 @@ GpuTracer::GpuTracer(const BakedFile& file, const LodSource& source, const GpuCo
 
 void GpuTracer::upload(const GpuConfig& config) {
   scene_ = std::make_unique<gpu::GpuScene>(config, tables_.view());
+  device_rays_ = std::make_unique<gpu::DeviceRays>(*scene_);
   device_ = scene_->device_name() + (scene_->emulates_floats() ? ", exact floats" : "");
 }
 
 void GpuTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
   assert(hits.size() == rays.size());
   scene_->closest({kernel_rays(rays), rays.size()}, ray_class, {kernel_hits(hits), hits.size()});
+}
+
+void GpuTracer::trace_view(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
+                           const Progress& progress) const {
+  assert(hits.size() == rays.size());
+  scene_->closest({kernel_rays(rays), rays.size()}, ray_class, {kernel_hits(hits), hits.size()},
+                  [&] { progress.check_cancelled(); });
+}
+
+void GpuTracer::trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                                std::span<OcclusionSums> sums, Progress& progress) const {
+  assert(sums.size() == points.size());
+  if (points.empty()) return;
+  constexpr uint32_t kPerThread = 16;
+  gpu::OcclusionRecord record{};
+  record.first_sample = samples.first, record.sample_count = samples.count;
+  record.per_thread = std::min(samples.count, kPerThread);
+  record.idle_lanes = std::max(scene_->subgroup_size() / 4, 1u);
+  record.order = gpu::kNetOrder, record.seed = samples.seed;
+  record.tfar = samples.tfar, record.inverse_radius = samples.inverse_radius;
+  record.lambda = samples.lambda, record.darkening = samples.darkening, record.end = samples.end;
+  record.floor = samples.floor, record.scale = samples.scale, record.parabola = samples.parabola;
+  const std::lock_guard lock(device_rays_mutex_);
+  uint64_t reported = 0;
+  const auto report = [&](double share) {
+    const auto done = static_cast<uint64_t>(share * static_cast<double>(points.size()));
+    progress.advance(done - reported);
+    reported = done;
+  };
+  device_rays_->set_watch(report);
+  device_rays_->set_points({reinterpret_cast<const gpu::PointRecord*>(points.data()), points.size()});
+  if (samples.nearest) {
+    device_rays_->sum_nearest(record);
+    device_rays_->sums({reinterpret_cast<double*>(sums.data()), 2 * sums.size()});
+  } else {
+    device_rays_->count_occluded(record);
+    std::vector<uint32_t> counts(points.size());
+    device_rays_->counts(counts);
+    for (size_t i = 0; i < counts.size(); ++i) {
+      const double open = samples.count - counts[i];
+      sums[i] = {open, open + 0.5 * counts[i]};
+    }
+  }
+  report(1.0);
 }
 
 void GpuTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<uint8_t> occluded) const {

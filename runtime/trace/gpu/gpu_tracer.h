@@ -1,17 +1,20 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 
+#include "runtime/gpu/device_rays.h"
 #include "runtime/gpu/gpu_config.h"
 #include "runtime/trace/gpu/gpu_tables.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 #include "runtime/trace/ray_tracer.h"
+#include "runtime/trace/view_tracer.h"
 
 namespace packtrace {
 
 /// Traces the packed clusters of a baked file on a GPU; its hits are PackedTracer's, bit for bit (docs/gpu.md). The
 /// packed tracer beside it chooses the trees, places instances and resolves hits.
-class GpuTracer final : public RayTracer {
+class GpuTracer final : public RayTracer, public ViewTracer {
 public:
   /// Keeps references, as PackedTracer does. Throws as PackedTracer and gpu::GpuScene do, and Error(kUnsupported) for
   /// geometry that deforms.
@@ -27,6 +30,11 @@ public:
                     std::span<RayHit> hits) const override;
   void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                 std::span<uint8_t> occluded) const override;
+  void trace_view(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
+                  const Progress& progress) const override;
+  void trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                       std::span<OcclusionSums> sums, Progress& progress) const override;
+  bool traces_occlusion(bool nearest) const override { return nearest || device_rays_->can_count(); }
   HitSurface resolve(const RayHit& hit) const override { return packed_.resolve(hit); }
   void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) override;
   std::span<const Affine> world_from_object() const override { return packed_.world_from_object(); }
@@ -46,6 +54,8 @@ private:
   PackedTracer packed_;
   GpuTables tables_;
   std::unique_ptr<gpu::GpuScene> scene_;
+  std::unique_ptr<gpu::DeviceRays> device_rays_;
+  mutable std::mutex device_rays_mutex_;
   std::string device_; ///< its name, and how it makes floats
 };
 

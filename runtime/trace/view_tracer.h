@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "pbrt_import/base/progress.h"
+#include "runtime/trace/ray_tracer.h"
+
+namespace packtrace {
+
+/// A surface point from which occlusion rays start, in a tracer's space().
+struct OcclusionPoint {
+  Vec3 origin; ///< lifted off the surface
+  Vec3 up;     ///< geometric normal, unit length
+  Vec3 normal; ///< shading normal, unit length
+  uint32_t pixel = 0;
+  uint32_t x_px = 0, y_px = 0;
+};
+
+/// The samples of all points: of SamplerKind::kSpaceTimeNet, directed as ShadingPoints::write_rays() does.
+struct OcclusionSamples {
+  uint32_t first = 0, count = 1; ///< numbers in the pixels' sequences
+  uint32_t seed = 0;             ///< of the sampler
+  float tfar = 0.0f;
+  bool nearest = false; ///< nearest hits and a visibility curve; else any hits, which occlude fully
+  // Of nearest hits: members of VisibilityCurve, and radii per length of space().
+  float inverse_radius = 0.0f, lambda = 0.0f, darkening = 0.0f, end = 0.0f, floor = 0.0f, scale = 0.0f, parabola = 0.0f;
+};
+
+/// Sums over the samples of a point, added in order.
+struct OcclusionSums {
+  double visibility = 0.0;
+  double distance = 0.0; ///< in radii; with any hits a hit counts as 0.5
+};
+
+/// A tracer that is fast only if it gets the rays of a whole picture at once. All functions may be called from several
+/// threads and throw Error(kCancelled) within a part of a second.
+class ViewTracer {
+public:
+  virtual ~ViewTracer() = default;
+
+  /// As RayTracer::closest_hits().
+  virtual void trace_view(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
+                          const Progress& progress) const = 0;
+
+  /// Makes the occlusion rays of all points and sums up what they meet: the bits that trace_ao() computes from spans of
+  /// rays.
+  /// @param sums as many as points
+  /// @param progress advances by the number of points
+  virtual void trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                               std::span<OcclusionSums> sums, Progress& progress) const = 0;
+
+  /// Whether trace_occlusion() works on this device for any hits or nearest hits.
+  virtual bool traces_occlusion(bool nearest) const = 0;
+};
+
+} // namespace packtrace

@@ -1,0 +1,138 @@
+// Whole pictures on a GPU: the G-buffer and the ambient occlusion are those of the packed tracer, bit for bit.
+
+#include <gtest/gtest.h>
+
+#include "runtime/ao/ao_integrator.h"
+#include "runtime/ao/view_occlusion.h"
+#include "runtime/camera/primary_visibility.h"
+#include "runtime/trace/gpu/gpu_tracer.h"
+#include "tests/runtime/gpu/gpu_test_device.h"
+#include "tests/runtime/trace/packed_scenes.h"
+
+namespace packtrace {
+namespace {
+
+constexpr ImageSize kSize{77, 45};
+
+class GpuPictureTest : public test::OnGpu {
+protected:
+  GpuPictureTest() : baked_(test::thicket_scene()), camera_(test::camera_at({0.1, 3, -12}, {0, 1, 0}), kSize) {}
+
+  GBuffer primary(const RayTracer& tracer) const {
+    GBuffer gbuffer;
+    Progress progress;
+    trace_primary(baked_.source, tracer, camera_, camera_, gbuffer, progress);
+    return gbuffer;
+  }
+
+  /// Compares ambient occlusion of both tracers.
+  /// @param on_device whether the device is to make the rays
+  void expect_same_ao(const AoConfig& config, const SamplePlan& plan, bool on_device = true) const {
+    const GpuTracer tracer(baked_.file, baked_.source, config_);
+    EXPECT_EQ(traces_view_occlusion(tracer, config, plan), on_device);
+    const GBuffer gbuffer = primary(tracer.packed());
+    AoFrame expected, ao;
+    Progress progress;
+    const uint64_t rays = trace_ao(baked_.source, tracer.packed(), gbuffer, config, plan, expected, progress);
+    EXPECT_EQ(trace_ao(baked_.source, tracer, gbuffer, config, plan, ao, progress), rays);
+    EXPECT_EQ(ao.ao, expected.ao);
+    EXPECT_EQ(ao.hit_distance, expected.hit_distance);
+    EXPECT_EQ(ao.samples, expected.samples);
+    size_t grey = 0;
+    for (const float value : expected.ao) grey += value > 0.0f && value < 1.0f ? 1 : 0;
+    EXPECT_GT(grey, 100u);
+    for (const std::string& message : tracer.scene().validation_messages()) ADD_FAILURE() << message;
+  }
+
+  const test::BakedScene baked_;
+  const PrimaryCamera camera_;
+};
+
+TEST_F(GpuPictureTest, PrimaryVisibility) {
+  const GpuTracer tracer(baked_.file, baked_.source, config_);
+  const GBuffer expected = primary(tracer.packed()), gbuffer = primary(tracer);
+  EXPECT_EQ(gbuffer.view_z, expected.view_z);
+  EXPECT_EQ(gbuffer.position, expected.position);
+  EXPECT_EQ(gbuffer.normal, expected.normal);
+  EXPECT_EQ(gbuffer.instance, expected.instance);
+  EXPECT_EQ(gbuffer.triangle, expected.triangle);
+  EXPECT_EQ(gbuffer.offset, expected.offset);
+  EXPECT_GT(std::ranges::count_if(expected.view_z, [](float z) { return z > 0.0f; }), 500);
+}
+
+TEST_F(GpuPictureTest, NearestHitsWithFalloff) {
+  AoConfig config;
+  config.radius = 4.0f;
+  config.seed = 0x123456789abcdefu;
+  expect_same_ao(config, SamplePlan{0, 4, {}, {}, {}});
+  config.continuous = false, config.min_visibility = 0.2f;
+  expect_same_ao(config, SamplePlan{65535, 2, {}, {}, {}}); // across an epoch of the sampler
+  config.continuous = true, config.lambda = 0.0f;
+  expect_same_ao(config, SamplePlan{7, 1, {}, {}, {}});
+}
+
+TEST_F(GpuPictureTest, AnyHitsWithoutFalloff) {
+  AoConfig config;
+  config.radius = 4.0f;
+  config.falloff = false;
+  expect_same_ao(config, SamplePlan{0, 4, {}, {}, {}});
+}
+
+TEST_F(GpuPictureTest, EveryOtherPixel) {
+  AoConfig config;
+  config.radius = 4.0f;
+  for (const uint32_t colour : {0u, 1u}) expect_same_ao(config, SamplePlan{3, 2, colour, {}, {}});
+}
+
+/// What the device does not make goes to it as spans of rays.
+TEST_F(GpuPictureTest, OtherSamplersAndInterreflection) {
+  AoConfig config;
+  config.radius = 4.0f;
+  config.sampler = SamplerKind::kPixelSobol;
+  expect_same_ao(config, SamplePlan{0, 1, {}, {}, {}}, false);
+  config.sampler = SamplerKind::kSpaceTimeNet, config.interreflection = 0.5f;
+  expect_same_ao(config, SamplePlan{0, 1, {}, {}, {}}, false);
+}
+
+TEST_F(GpuPictureTest, ProgressReachesTheNumberOfPixels) {
+  const GpuTracer tracer(baked_.file, baked_.source, config_);
+  const GBuffer gbuffer = primary(tracer);
+  uint64_t reached = 0;
+  Progress progress([&](std::string_view, uint64_t done, uint64_t) { reached = std::max(reached, done); });
+  progress.begin("occlusion", kSize.pixels());
+  AoConfig config;
+  AoFrame ao;
+  trace_ao(baked_.source, tracer, gbuffer, config, SamplePlan{}, ao, progress);
+  EXPECT_EQ(reached, kSize.pixels());
+}
+
+/// An observer that cancels stops the work between two dispatches.
+TEST_F(GpuPictureTest, CancelInTheMiddle) {
+  GpuConfig short_dispatches = config_;
+  short_dispatches.dispatch_ms = 1e-3;
+  const GpuTracer tracer(baked_.file, baked_.source, short_dispatches);
+  const GBuffer gbuffer = primary(tracer);
+  uint64_t reached = 0;
+  Progress progress([&](std::string_view, uint64_t done, uint64_t) {
+    reached = std::max(reached, done);
+    if (reached > kSize.pixels() * 3 / 4) throw Error(ErrorKind::kCancelled, "stopped");
+  });
+  progress.begin("occlusion", kSize.pixels());
+  AoConfig config;
+  AoFrame ao;
+  try {
+    trace_ao(baked_.source, tracer, gbuffer, config, SamplePlan{0, 32, {}, {}, {}}, ao, progress);
+    FAIL() << "not cancelled";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kCancelled);
+  }
+  EXPECT_LT(reached, kSize.pixels());
+  Progress fresh;
+  AoFrame expected;
+  trace_ao(baked_.source, tracer, gbuffer, config, SamplePlan{}, ao, fresh); // the device can go on
+  trace_ao(baked_.source, tracer.packed(), gbuffer, config, SamplePlan{}, expected, fresh);
+  EXPECT_EQ(ao.ao, expected.ao);
+}
+
+} // namespace
+} // namespace packtrace
