@@ -125,21 +125,26 @@ public:
     SurfacePoint at(double u) const {
       const Jet along_u = curve(u, &Jet::value);
       const DVec4 p = along_u.value, dv = curve(u, &Jet::derivative).value;
-      if ((p.w > 0.0) != surface_.weight_is_positive_) fail("the nurbs surface runs through infinity");
-      const auto projected = [&](const DVec4& d) { return (DVec3(d) * p.w - DVec3(p) * d.w) / (p.w * p.w); };
-      const SurfacePoint point{DVec3(p) / p.w, glm::cross(projected(along_u.derivative), projected(dv))};
-      if (!is_finite(Vec3(point.position))) fail("a point of the nurbs surface is not finite");
-      return point;
+      const DVec3 position = projected(p);
+      const auto slope = [&](const DVec4& d) { return (DVec3(d) * p.w - DVec3(p) * d.w) / (p.w * p.w); };
+      return {position, glm::cross(slope(along_u.derivative), slope(dv))};
     }
 
     std::vector<DVec3> positions(std::span<const double> us) const {
       std::vector<DVec3> result;
       result.reserve(us.size());
-      for (const double u : us) result.push_back(at(u).position);
+      for (const double u : us) result.push_back(projected(curve(u, &Jet::value).value));
       return result;
     }
 
   private:
+    DVec3 projected(const DVec4& p) const {
+      if ((p.w > 0.0) != surface_.weight_is_positive_) fail("the nurbs surface runs through infinity");
+      const DVec3 position = DVec3(p) / p.w;
+      if (!is_finite(Vec3(position))) fail("a point of the nurbs surface is not finite");
+      return position;
+    }
+
     Jet curve(double u, DVec4 Jet::* which) const {
       const Axis& axis = surface_.u_;
       const uint32_t span = axis.span_of(u), first = span + 1 - axis.order;
@@ -230,13 +235,20 @@ Deviation measure(const Grid& grid, const Surface& surface, const CheckCancelled
   return worst;
 }
 
+/// Reserves the memory of the grid's mesh.
+void reserve_mesh(MemoryReservation* memory, const Grid& grid) {
+  const uint64_t triangle_bytes = 2 * 2 * sizeof(Triangle); // the vector of triangles doubles its capacity as it grows
+  reserve_for_shape(memory, grid.vertex_count() * (2 * sizeof(Vec3) + sizeof(Vec2) + triangle_bytes));
+}
+
 Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relative_tolerance, const ReportFn& report,
-            const CheckCancelledFn& check_cancelled) {
+            const CheckCancelledFn& check_cancelled, MemoryReservation* memory) {
   // Starts with four segments, so that an inflection in the middle of a span does not look straight.
   uint32_t u_segments = u.order > 2 ? 4 : 1, v_segments = v.order > 2 ? 4 : 1;
   Grid grid{grid_lines(u, u_segments), grid_lines(v, v_segments)};
   if (grid.vertex_count() > kMaxVertices) fail_too_many();
   while (true) {
+    reserve_mesh(memory, grid); // before it is measured, which takes longer
     const Deviation deviation = measure(grid, surface, check_cancelled);
     if (deviation.tolerance() <= relative_tolerance) return grid;
     const double most = relative_tolerance * deviation.size / 2;
@@ -307,9 +319,7 @@ Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, c
   for (const glm::vec4& p : nurbs.control_points)
     if (!is_finite(Vec3(p)) || !std::isfinite(p.w)) fail("a control point is not finite");
   const Surface surface(u, v, nurbs.control_points);
-  const Grid grid = refine(u, v, surface, relative_tolerance, report, check_cancelled);
-  const uint64_t triangle_bytes = 2 * 2 * sizeof(Triangle); // the vector of triangles doubles its capacity as it grows
-  reserve_for_shape(memory, grid.vertex_count() * (2 * sizeof(Vec3) + sizeof(Vec2) + triangle_bytes));
+  const Grid grid = refine(u, v, surface, relative_tolerance, report, check_cancelled, memory);
   return mesh_of(grid, surface, check_cancelled);
 }
 
