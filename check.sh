@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs dependencies, builds, and runs all tests with their regression limits.
 # Usage: ./check.sh [PRESET ...] (default: release, then asan without the tests on whole scenes)
+#        ./check.sh interop (glTF with other programs: Khronos validator, three.js, glTF-Transform, gltfpack; needs the network)
 #        ./check.sh tidy (clang-tidy on all sources; otherwise it checks those that changed since main)
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -30,6 +31,12 @@ export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
 begin_stage "Format"
 find pbrt_import compress runtime tests assets docs \( -name '*.h' -o -name '*.cpp' \) -print0 |
   xargs -0 clang-format-19 --dry-run -Werror
+if [ "${presets[*]}" = interop ]; then
+  begin_stage "Interoperation"
+  bash .ci/install_packages.sh interop
+  cmake --preset release -DPython_EXECUTABLE=/usr/bin/python3 -DPACKTRACE_WERROR=ON -DPACKTRACE_BUILD_PYTHON=ON -DPACKTRACE_UNITY=all >/dev/null
+  exec cmake --build --preset release --target interop
+fi
 if [ "${presets[*]}" = tidy ]; then
   begin_stage "clang-tidy (all sources)"
   exec .ci/clang_tidy.sh all

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs Debian 12 packages: those that packtrace itself needs, those of the groups named, and further ones by name.
 # Does nothing if all are installed.
-# Usage: .ci/install_packages.sh [window | tests | benchmarks | python | PACKAGE ...]
+# Usage: .ci/install_packages.sh [window | tests | interop | benchmarks | python | PACKAGE ...]
 set -euo pipefail
 
 packages=(
@@ -22,6 +22,9 @@ for argument in "$@"; do
         dpkg-dev file # Debian packages of packtrace itself
       ) ;;
     benchmarks) packages+=(libbenchmark-dev libopenmesh-dev) ;; # what packtrace is compared with
+    interop) # the caller's Node.js, or Debian's
+      command -v npm >/dev/null || packages+=(nodejs npm)
+      packages+=(chromium) ;;
     python) packages+=(python3-dev python3-numpy pybind11-dev) ;;
     *) packages+=("$argument") ;;
   esac

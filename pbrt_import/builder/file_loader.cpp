@@ -67,7 +67,8 @@ FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
     outcome.bytes = file.size();
     image.summary =
         read_image(image.embedded.empty() ? std::span<const std::byte>(file) : image.embedded, image.decode_srgb,
-                   {image.want_mask, image.want_colours, image.want_radiance, image.alpha_cutoff}, outcome.memory);
+                   {image.want_mask, image.want_colours, image.want_radiance, image.alpha_cutoff, image.grey_cutoff},
+                   outcome.memory);
   });
   outcome.memory.resize(bytes_of(image.summary), "its pixels");
   image.missing = !outcome.error.empty();

@@ -224,8 +224,15 @@ ImageSummary read_webp(std::span<const std::byte> bytes, bool decode_srgb, Image
   const ClaimedImageSize size{reader.width(), reader.height(), kPixelsPerByte};
   size.check(bytes.size(), reader.working_bytes(), wants, memory);
   const std::vector<uint8_t> pixels = reader.decode();
-  ImageSummary summary =
-      summarize_bytes<4>(pixels.data(), reader.width(), reader.height(), wants, linear_of_bytes(decode_srgb));
+  const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
+  ImageSummarizer summarizer(reader.width(), reader.height(), wants);
+  std::vector<uint8_t> row(size_t{reader.width()} * 3);
+  for (uint32_t y = 0; y < reader.height(); ++y) {
+    const uint8_t* from = pixels.data() + size_t{y} * reader.width() * 4;
+    for (size_t i = 0; i < row.size(); i += 3, from += 4) std::copy(from, from + 3, &row[i]);
+    summarizer.add_row<3>(y, row.data(), linear);
+  }
+  ImageSummary summary = summarizer.finish();
   if (wants.mask && wants.alpha_cutoff)
     summary.nonzero = alpha_bits(pixels.data(), reader.width(), reader.height(), *wants.alpha_cutoff);
   return summary;

@@ -33,6 +33,8 @@ struct ImageWants {
   bool radiance = false; ///< fill ImageSummary::radiance
   /// Set: bits of the mask are set where the image's alpha, in [0, 1], is at least this; everywhere without alpha.
   std::optional<float> alpha_cutoff{};
+  /// Set: bits of the mask are set where the largest of the linear channels is at least this.
+  std::optional<float> grey_cutoff{};
 };
 
 /// Only the average is kept of images with more texels.

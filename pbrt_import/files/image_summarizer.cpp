@@ -15,7 +15,8 @@ void add_problem(ImageSummary& summary, uint64_t pixels, std::string_view of_one
 }
 
 ImageSummarizer::ImageSummarizer(uint32_t width, uint32_t height, ImageWants wants)
-    : width_(width), want_mask_(wants.mask), want_colours_(wants.colours), want_radiance_(wants.radiance) {
+    : width_(width), want_mask_(wants.mask), want_colours_(wants.colours), want_radiance_(wants.radiance),
+      grey_cutoff_(wants.grey_cutoff) {
   summary_.width = width;
   summary_.height = height;
   want_colours_ = want_colours_ && uint64_t{width} * height <= kMaxTextureTexels;

@@ -29,7 +29,8 @@ public:
       ++not_finite_pixels_;
       return;
     }
-    const bool nonzero = pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f;
+    const bool nonzero = grey_cutoff_ ? std::max({pixel.x, pixel.y, pixel.z}) >= *grey_cutoff_
+                                      : pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f;
     if (pixel.x < 0.0f || pixel.y < 0.0f || pixel.z < 0.0f) {
       ++negative_pixels_;
       pixel = glm::max(pixel, Vec3(0.0f));
@@ -99,7 +100,8 @@ private:
       uint32_t bits = 0;
       for (uint32_t i = 0; i < count; ++i) {
         bool nonzero = false;
-        for (uint32_t c = 0; c < kChannels; ++c) nonzero |= linear[*pixels++] != 0.0f;
+        for (uint32_t c = 0; c < kChannels; ++c, ++pixels)
+          nonzero |= grey_cutoff_ ? linear[*pixels] >= *grey_cutoff_ : linear[*pixels] != 0.0f;
         bits |= (nonzero ? 1u : 0u) << i;
       }
       row[w] = bits;
@@ -110,6 +112,7 @@ private:
   uint64_t not_finite_pixels_ = 0, negative_pixels_ = 0, too_bright_pixels_ = 0;
   uint32_t width_;
   bool want_mask_, want_colours_, want_radiance_;
+  std::optional<float> grey_cutoff_;
   DVec3 row_{0.0}, total_{0.0};
 };
 

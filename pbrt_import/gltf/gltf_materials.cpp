@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pbrt_import/files/image_file.h"
 #include "pbrt_import/text/problem_text.h"
 
 namespace packtrace::gltf {
@@ -71,6 +72,16 @@ uint64_t image_of(const Value& texture) {
 }
 
 } // namespace
+
+/// Mean of an image's values, as they are stored.
+Vec3 Materials::image_average(const Value& info) {
+  const Value image = document_.element("images", image_of(document_.element("textures", info.at("index").integer())));
+  const std::optional<Value> uri = image.find("uri");
+  const std::span<const std::byte> bytes =
+      uri ? document_.uri_bytes(*uri) : document_.view_bytes(image.at("bufferView").integer());
+  MemoryReservation memory(document_.context().options.memory);
+  return read_image(bytes, false, {}, memory).average;
+}
 
 void Materials::read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset) {
   use.uv_set = info.find_integer("texCoord").value_or(0);
@@ -164,6 +175,12 @@ void Materials::define(const Value& material, MaterialUse& use) {
   if (glm::any(glm::lessThan(use.emission, Vec3(0.0f)))) material.fail("emits negative light");
   const std::optional<Value> ior = material.extension("KHR_materials_ior");
 
+  Vec3 means(1.0f); // of roughness in y, of metalness in z
+  if (const std::optional<Value> texture = base.find("metallicRoughnessTexture")) {
+    const std::string problem = problem_of([&] { means = image_average(*texture); });
+    warn(problem.empty() ? "textures of metalness and roughness are reduced to their means"
+                         : "a texture of metalness and roughness counts as white: " + problem);
+  }
   feed.begin("MakeNamedMaterial", document_.place(), {use.name});
   const bool unlit = material.extension("KHR_materials_unlit").has_value();
   std::string_view kind = "disney", parameter = "color";
@@ -176,10 +193,8 @@ void Materials::define(const Value& material, MaterialUse& use) {
     feed.texture(parameter, texture);
   if (kind == "glass") feed.number("eta", static_cast<float>(std::max(ior ? ior->number_or("ior", 1.5) : 1.5, 1.0)));
   if (kind == "disney") {
-    feed.number("metallic", clamped(base.number_or("metallicFactor", 1.0)));
-    feed.number("roughness", clamped(base.number_or("roughnessFactor", 1.0)));
-    if (base.has("metallicRoughnessTexture"))
-      warn("textures of metalness and roughness are not read; their factors are used");
+    feed.number("metallic", clamped(base.number_or("metallicFactor", 1.0) * double{means.z}));
+    feed.number("roughness", clamped(base.number_or("roughnessFactor", 1.0) * double{means.y}));
   }
   feed.send();
 }

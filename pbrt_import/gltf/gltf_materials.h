@@ -34,6 +34,7 @@ private:
   std::string define_image(const Value& info, MaterialUse& use, std::string_view what, std::optional<float> cutoff);
   void read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset);
   std::string image_file(uint64_t image);
+  Vec3 image_average(const Value& info);
   std::string unique_name(const Value& material, size_t number);
   void warn(const std::string& text);
 

@@ -19,12 +19,12 @@ DVec3 to_dvec3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
 /// What an animation sets of a node.
 struct AnimatedValues {
-  std::optional<std::vector<double>> translation, rotation, scale;
+  std::optional<std::vector<double>> translation, rotation, scale, weights;
 };
 
 /// Values of a sampler at a time. Source: glTF 2.0 specification, appendix C.
 std::vector<double> evaluate(const std::vector<float>& times, const std::vector<float>& values, size_t components,
-                             const std::string& interpolation, double time) {
+                             const std::string& interpolation, double time, bool rotates) {
   const bool cubic = interpolation == "CUBICSPLINE";
   const size_t stride = components * (cubic ? 3 : 1), shift = cubic ? components : 0;
   const auto value = [&](size_t key, size_t i) { return double{values[key * stride + shift + i]}; };
@@ -37,7 +37,7 @@ std::vector<double> evaluate(const std::vector<float>& times, const std::vector<
   }
   const size_t key = next - 1;
   const double span = double{times[next]} - double{times[key]}, t = (time - double{times[key]}) / span;
-  if (!cubic && components == 4) { // rotations are interpolated on the sphere
+  if (!cubic && rotates) { // rotations are interpolated on the sphere
     const auto quaternion = [&](size_t k) { return glm::dquat(value(k, 3), value(k, 0), value(k, 1), value(k, 2)); };
     const glm::dquat q = glm::slerp(quaternion(key), quaternion(next), t);
     return {q.x, q.y, q.z, q.w};
@@ -62,28 +62,28 @@ void read_channel(Document& document, const Value& animation, const Value& chann
   const std::optional<uint64_t> node = target.find_integer("node");
   const std::string path = target.at("path").text();
   if (!node) return;
-  if (path == "weights")
-    return document.context().feed.reporter().warning(document.place(),
-                                                      "animated morph targets are not read; meshes keep their shape");
   const bool rotates = path == "rotation";
-  if (!rotates && path != "translation" && path != "scale") target.fail("has an unknown path");
+  const bool morphs = path == "weights";
+  if (!rotates && !morphs && path != "translation" && path != "scale") target.fail("has an unknown path");
   const Value sampler = animation.at("samplers")[static_cast<size_t>(channel.at("sampler").integer())];
   const std::string interpolation = sampler.text_or("interpolation", "LINEAR");
   if (interpolation != "LINEAR" && interpolation != "STEP" && interpolation != "CUBICSPLINE")
     sampler.fail("has an unknown interpolation");
   const AccessorValues times = read_floats(document, sampler.at("input").integer());
   const AccessorValues values = read_floats(document, sampler.at("output").integer());
-  const uint32_t components = rotates ? 4 : 3;
-  if (times.components != 1 || times.count == 0 || values.components != components ||
-      values.count != times.count * (interpolation == "CUBICSPLINE" ? 3 : 1))
-    sampler.fail("has times and values that do not fit each other");
+  const uint64_t keys = times.count * (interpolation == "CUBICSPLINE" ? 3 : 1);
+  const bool fits = times.components == 1 && keys > 0 &&
+                    (morphs ? values.components == 1 && values.count % keys == 0 && values.count > 0
+                            : values.components == (rotates ? 4u : 3u) && values.count == keys);
+  if (!fits) sampler.fail("has times and values that do not fit each other");
   for (size_t i = 1; i < times.values.size(); ++i)
     if (!(times.values[i] > times.values[i - 1])) sampler.fail("has times that do not increase");
-  std::vector<double> value = evaluate(times.values, values.values, components, interpolation, time);
+  const size_t components = values.values.size() / static_cast<size_t>(keys); // of morphing: its targets
+  std::vector<double> value = evaluate(times.values, values.values, components, interpolation, time, rotates);
   if (!std::ranges::all_of(value, [](double v) { return std::isfinite(v); }))
     sampler.fail("has values that are not finite");
   AnimatedValues& set = animated[*node];
-  (rotates ? set.rotation : path == "scale" ? set.scale : set.translation) = std::move(value);
+  (rotates ? set.rotation : morphs ? set.weights : path == "scale" ? set.scale : set.translation) = std::move(value);
 }
 
 /// Values that the document's first animation gives nodes at a time; further animations are alternatives to it.
@@ -151,7 +151,7 @@ std::vector<PlacedNode> place_nodes(Document& document, double time) {
   std::vector<bool> visited(count, false);
   std::vector<PlacedNode> open, placed;
   std::vector<uint64_t> roots = scene_roots(document);
-  for (const uint64_t root : roots | std::views::reverse) open.push_back({root, DAffine(1.0)});
+  for (const uint64_t root : roots | std::views::reverse) open.push_back({root, DAffine(1.0), {}});
   while (!open.empty()) {
     PlacedNode next = open.back();
     open.pop_back();
@@ -160,12 +160,14 @@ std::vector<PlacedNode> place_nodes(Document& document, double time) {
       if (visited[static_cast<size_t>(next.node)]) node.fail("has several parents");
       visited[static_cast<size_t>(next.node)] = true;
       const auto found = animated.find(next.node);
-      next.world_from_node =
-          compose(next.world_from_node, local_map(node, found == animated.end() ? AnimatedValues{} : found->second));
+      const AnimatedValues values = found == animated.end() ? AnimatedValues{} : found->second;
+      next.world_from_node = compose(next.world_from_node, local_map(node, values));
+      if (const std::optional<Value> weights = node.find("weights")) next.weights = weights->numbers(weights->size());
+      if (values.weights) next.weights = *values.weights;
       placed.push_back(next);
       const std::optional<Value> children = node.find("children");
       for (size_t i = children ? children->size() : 0; i-- > 0;)
-        open.push_back({(*children)[i].integer(), next.world_from_node});
+        open.push_back({(*children)[i].integer(), next.world_from_node, {}});
     });
     if (!problem.empty()) reporter.error(document.place(), problem + "; the node is left out");
   }

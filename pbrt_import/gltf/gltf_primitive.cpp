@@ -18,6 +18,7 @@ enum class Mode : uint64_t { kTriangles = 4, kStrip = 5, kFan = 6 };
 struct PrimitiveMesh {
   std::vector<float> positions, normals, uvs; ///< 3, 3 and 2 per vertex; the last two may be empty
   std::vector<uint32_t> indices;              ///< as its mode arranges them
+  std::vector<JointSet> joints;               ///< only with a skin
   uint64_t vertices = 0;
 };
 
@@ -32,12 +33,17 @@ std::vector<float> read_attribute(Document& document, const Value& attributes, c
   return std::move(values.values);
 }
 
-PrimitiveMesh read_plain(Document& document, const Value& primitive, const std::string& uv_name) {
+std::string numbered(const char* name, size_t number) { return name + std::to_string(number); }
+
+PrimitiveMesh read_plain(Document& document, const Value& primitive, const std::string& uv_name, bool skinned) {
   PrimitiveMesh mesh;
   const Value attributes = primitive.at("attributes");
   mesh.positions = read_attribute(document, attributes, "POSITION", 3, mesh.vertices);
   mesh.normals = read_attribute(document, attributes, "NORMAL", 3, mesh.vertices);
   mesh.uvs = read_attribute(document, attributes, uv_name.c_str(), 2, mesh.vertices);
+  for (size_t set = 0; skinned && attributes.has(numbered("JOINTS_", set).c_str()); ++set)
+    mesh.joints.push_back({read_attribute(document, attributes, numbered("JOINTS_", set).c_str(), 4, mesh.vertices),
+                           read_attribute(document, attributes, numbered("WEIGHTS_", set).c_str(), 4, mesh.vertices)});
   if (const std::optional<uint64_t> indices = primitive.find_integer("indices")) {
     mesh.indices = read_indices(document, *indices);
   } else {
@@ -47,27 +53,34 @@ PrimitiveMesh read_plain(Document& document, const Value& primitive, const std::
   return mesh;
 }
 
-PrimitiveMesh read_draco(Document& document, const Value& primitive, const Value& extension,
-                         const std::string& uv_name) {
+PrimitiveMesh read_draco(Document& document, const Value& primitive, const Value& extension, const std::string& uv_name,
+                         bool skinned) {
   const std::span<const std::byte> bytes = document.view_bytes(extension.at("bufferView").integer());
-  DracoPrimitive decoded = decode_draco(bytes, {{"POSITION", 3}, {"NORMAL", 3}, {uv_name, 2}}, extension);
+  DracoWants wants{{"POSITION", 3}, {"NORMAL", 3}, {uv_name, 2}};
+  if (skinned) wants["JOINTS_0"] = wants["WEIGHTS_0"] = 4;
+  DracoPrimitive decoded = decode_draco(bytes, wants, extension);
   PrimitiveMesh mesh;
   mesh.vertices = decoded.vertices;
   mesh.indices = std::move(decoded.indices);
   mesh.positions = std::move(decoded.attributes["POSITION"]);
   mesh.normals = std::move(decoded.attributes["NORMAL"]);
   mesh.uvs = std::move(decoded.attributes[uv_name]);
+  if (skinned && decoded.attributes.contains("JOINTS_0"))
+    mesh.joints.push_back({std::move(decoded.attributes["JOINTS_0"]), std::move(decoded.attributes["WEIGHTS_0"])});
   if (primitive.find_integer("mode").value_or(4) == static_cast<uint64_t>(Mode::kFan))
     primitive.fail("has a mode that Draco does not know");
   return mesh;
 }
 
-/// Adds the morph targets of a primitive with the weights of its mesh.
-void morph(Document& document, const Value& mesh_value, const Value& primitive, PrimitiveMesh& mesh) {
-  const std::optional<Value> targets = primitive.find("targets"), weights = mesh_value.find("weights");
-  if (!targets || !weights) return;
-  for (size_t i = 0; i < std::min(targets->size(), weights->size()); ++i) {
-    const double weight = (*weights)[i].number();
+/// Adds the morph targets of a primitive.
+/// @param weights empty: those of its mesh
+void morph(Document& document, const Value& mesh_value, const Value& primitive, std::vector<double> weights,
+           PrimitiveMesh& mesh) {
+  const std::optional<Value> targets = primitive.find("targets"), own = mesh_value.find("weights");
+  if (!targets) return;
+  if (weights.empty() && own) weights = own->numbers(own->size());
+  for (size_t i = 0; i < std::min(targets->size(), weights.size()); ++i) {
+    const double weight = weights[i];
     if (weight == 0.0) continue;
     uint64_t vertices = mesh.vertices;
     const std::vector<float> moved = read_attribute(document, (*targets)[i], "POSITION", 3, vertices);
@@ -125,8 +138,9 @@ void convert_uvs(std::vector<float>& uvs, const MaterialUse& use) {
 }
 
 /// The lattice of the positions: the one that the mesh or the document states, as exports do, or that of integers.
-std::optional<std::vector<int32_t>> lattice_of(Document& document, const Value& mesh, const Value& primitive) {
-  if (primitive.find("targets")) return std::nullopt; // morphing leaves it
+std::optional<std::vector<int32_t>> lattice_of(Document& document, const Value& mesh, const Value& primitive,
+                                               bool skinned) {
+  if (skinned || primitive.find("targets")) return std::nullopt; // the positions leave it
   constexpr const char* kLattice = "packtrace_lattice";
   for (const Value& owner : {mesh, document.root().at("asset")}) {
     const std::optional<Value> extras = owner.find("extras");
@@ -148,8 +162,8 @@ std::optional<std::vector<int32_t>> lattice_of(Document& document, const Value& 
 
 } // namespace
 
-void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh_value,
-                        const Value& primitive) {
+void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh_value, const Value& primitive,
+                        const Pose& pose) {
   DirectiveFeed& feed = document.context().feed;
   const uint64_t mode = primitive.find_integer("mode").value_or(4);
   if (mode < 4) return feed.reporter().warning(document.place(), "points and lines have no surface; they are left out");
@@ -157,42 +171,47 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
   const MaterialUse& use = materials.use(primitive.find_integer("material"));
   const std::string uv_name = "TEXCOORD_" + std::to_string(use.uv_set);
   const std::optional<Value> draco = primitive.extension("KHR_draco_mesh_compression");
-  PrimitiveMesh mesh =
-      draco ? read_draco(document, primitive, *draco, uv_name) : read_plain(document, primitive, uv_name);
+  PrimitiveMesh mesh = draco ? read_draco(document, primitive, *draco, uv_name, !pose.joints.empty())
+                             : read_plain(document, primitive, uv_name, !pose.joints.empty());
   if (mesh.positions.empty()) primitive.fail("has no positions");
-  morph(document, mesh_value, primitive, mesh);
+  morph(document, mesh_value, primitive, pose.weights, mesh);
+  if (!pose.joints.empty()) {
+    for (const JointSet& set : mesh.joints)
+      if (set.joints.size() != mesh.vertices * 4 || set.weights.size() != mesh.vertices * 4)
+        primitive.fail("has joints without weights");
+    move_with_joints(pose.joints, mesh.joints, primitive, mesh.positions, mesh.normals);
+  }
   // Draco's decoder turns strips into triangles.
   const std::vector<int32_t> indices = triangles_of(mesh, draco ? Mode::kTriangles : Mode{mode}, primitive);
   if (indices.empty()) return;
   convert_uvs(mesh.uvs, use);
 
   const Place place = document.place();
-  feed.begin("AttributeBegin", place);
-  feed.send();
-  if (use.name.empty())
-    feed.begin("Material", place, {"matte"});
-  else
-    feed.begin("NamedMaterial", place, {use.name});
-  feed.send();
-  if (use.emission != Vec3(0.0f)) {
-    feed.begin("AreaLightSource", place, {"diffuse"});
-    feed.colour("L", use.emission);
+  feed.with_attributes(place, [&] {
+    if (use.name.empty())
+      feed.begin("Material", place, {"matte"});
+    else
+      feed.begin("NamedMaterial", place, {use.name});
     feed.send();
-  }
-  feed.begin("Shape", place, {"trianglemesh"});
-  feed.floats(ParameterType::kPoint3, "P", mesh.positions);
-  if (!mesh.normals.empty()) feed.floats(ParameterType::kNormal, "N", mesh.normals);
-  if (!mesh.uvs.empty()) feed.floats(ParameterType::kFloat, "uv", mesh.uvs);
-  feed.integers("indices", indices);
-  if (const std::optional<std::vector<int32_t>> lattice = lattice_of(document, mesh_value, primitive))
-    feed.integers("lattice", *lattice);
-  if (use.absent)
-    feed.number("alpha", 0.0f);
-  else if (!use.opacity.empty())
-    feed.texture("alpha", use.opacity);
-  feed.send();
-  feed.begin("AttributeEnd", place);
-  feed.send();
+    if (use.emission != Vec3(0.0f)) {
+      feed.begin("AreaLightSource", place, {"diffuse"});
+      feed.colour("L", use.emission);
+      feed.send();
+    }
+    feed.begin("Shape", place, {"trianglemesh"});
+    feed.floats(ParameterType::kPoint3, "P", mesh.positions);
+    if (!mesh.normals.empty()) feed.floats(ParameterType::kNormal, "N", mesh.normals);
+    if (!mesh.uvs.empty()) feed.floats(ParameterType::kFloat, "uv", mesh.uvs);
+    feed.integers("indices", indices);
+    if (const std::optional<std::vector<int32_t>> lattice =
+            lattice_of(document, mesh_value, primitive, !pose.joints.empty()))
+      feed.integers("lattice", *lattice);
+    if (use.absent)
+      feed.number("alpha", 0.0f);
+    else if (!use.opacity.empty())
+      feed.texture("alpha", use.opacity);
+    feed.send();
+  });
 }
 
 } // namespace packtrace::gltf

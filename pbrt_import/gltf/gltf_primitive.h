@@ -2,12 +2,14 @@
 
 #include "pbrt_import/gltf/gltf_document.h"
 #include "pbrt_import/gltf/gltf_materials.h"
+#include "pbrt_import/gltf/gltf_pose.h"
 
 namespace packtrace::gltf {
 
 /// Adds a primitive as a triangle mesh of its material: triangles, strips or fans, with or without indices, compressed
-/// by Draco or not, with the morph weights of its mesh. Points and lines are left out with a warning.
+/// by Draco or not, deformed by morph targets and a skin. Points and lines are left out with a warning.
 /// Throws Error(kInput) if it is malformed; MemoryError.
-void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh, const Value& primitive);
+void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh, const Value& primitive,
+                        const Pose& pose);
 
 } // namespace packtrace::gltf

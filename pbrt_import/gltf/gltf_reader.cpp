@@ -27,11 +27,14 @@ void Reader::collect_meshes() {
              const std::optional<uint64_t> mesh = node.find_integer("mesh");
              if (!mesh) return;
              document_->element("meshes", *mesh); // throws if there is none
-             if (node.has("skin"))
-               context_.feed.reporter().warning(document_->place(),
-                                                "skins are not read; their meshes keep their shape");
+             Pose pose{placed.weights, {}};
+             if (const std::optional<uint64_t> skin = node.find_integer("skin")) {
+               pose.joints = joint_maps(*document_, *skin, nodes_);
+               uses_.push_back({*mesh, DAffine(1.0), std::move(pose)}); // the node's own map does not matter
+               return;
+             }
              for (const DAffine& map : instances_of(*document_, node))
-               uses_.push_back({*mesh, compose(placed.world_from_node, map)});
+               uses_.push_back({*mesh, compose(placed.world_from_node, map), pose});
            }),
            "the node is left out");
   }
@@ -88,7 +91,8 @@ void Reader::add_world() {
   DirectiveFeed& feed = context_.feed;
   const Materials materials(*document_, context_.file_names);
   std::vector<uint32_t> counts(document_->count("meshes"), 0);
-  for (const MeshUse& use : uses_) ++counts[static_cast<size_t>(use.mesh)];
+  for (const MeshUse& use : uses_)
+    if (use.pose.empty()) ++counts[static_cast<size_t>(use.mesh)];
   const auto object_name = [](uint64_t mesh, const Value& value) {
     return value.text_or("name", "mesh") + "#" + std::to_string(mesh);
   };
@@ -96,32 +100,26 @@ void Reader::add_world() {
     if (counts[i] < 2) continue;
     context_.progress.check_cancelled();
     report(problem_of([&] {
-             feed.begin("AttributeBegin", document_->place());
-             feed.send();
-             feed.transform("Transform", document_->place(), DAffine(1.0));
-             feed.begin("ObjectBegin", document_->place(), {object_name(i, document_->element("meshes", i))});
-             feed.send();
-             add_shapes(materials, i);
-             feed.begin("ObjectEnd", document_->place());
-             feed.send();
-             feed.begin("AttributeEnd", document_->place());
-             feed.send();
+             feed.with_attributes(document_->place(), [&] {
+               feed.transform("Transform", document_->place(), DAffine(1.0));
+               feed.begin("ObjectBegin", document_->place(), {object_name(i, document_->element("meshes", i))});
+               feed.send();
+               add_shapes(materials, i, {});
+               feed.begin("ObjectEnd", document_->place());
+               feed.send();
+             });
            }),
            "the mesh is left out");
   }
   for (const MeshUse& use : uses_) {
     context_.progress.check_cancelled();
-    feed.begin("AttributeBegin", document_->place());
-    feed.send();
-    feed.transform("ConcatTransform", document_->place(), use.world_from_mesh);
-    if (counts[static_cast<size_t>(use.mesh)] < 2) {
-      add_shapes(materials, use.mesh);
-    } else {
+    feed.with_attributes(document_->place(), [&] {
+      feed.transform("ConcatTransform", document_->place(), use.world_from_mesh);
+      if (!use.pose.empty() || counts[static_cast<size_t>(use.mesh)] < 2)
+        return add_shapes(materials, use.mesh, use.pose);
       feed.begin("ObjectInstance", document_->place(), {object_name(use.mesh, document_->element("meshes", use.mesh))});
       feed.send();
-    }
-    feed.begin("AttributeEnd", document_->place());
-    feed.send();
+    });
   }
   for (const PlacedNode& placed : nodes_)
     report(problem_of([&] {
@@ -132,12 +130,12 @@ void Reader::add_world() {
            "the light is left out");
 }
 
-void Reader::add_shapes(const Materials& materials, uint64_t number) {
+void Reader::add_shapes(const Materials& materials, uint64_t number, const Pose& pose) {
   const Value mesh = document_->element("meshes", number);
   const std::string problem = problem_of([&] {
     const Value primitives = mesh.at("primitives");
     for (size_t i = 0; i < primitives.size(); ++i)
-      report(problem_of([&] { add_gltf_primitive(*document_, materials, mesh, primitives[i]); }),
+      report(problem_of([&] { add_gltf_primitive(*document_, materials, mesh, primitives[i], pose); }),
              "the primitive is left out");
   });
   report(problem, "the mesh is left out");
@@ -155,32 +153,30 @@ void Reader::add_light(const PlacedNode& placed, uint64_t number) {
       intensity * Vec3(static_cast<float>(colour[0]), static_cast<float>(colour[1]), static_cast<float>(colour[2]));
   DirectiveFeed& feed = context_.feed;
   const std::array<float, 3> origin = {0, 0, 0}, ahead = {0, 0, -1}, behind = {0, 0, 1};
-  feed.begin("AttributeBegin", document_->place());
-  feed.send();
-  feed.transform("ConcatTransform", document_->place(), placed.world_from_node);
-  if (type == "directional") {
-    feed.begin("LightSource", document_->place(), {"distant"});
-    feed.colour("L", power);
-    feed.floats(ParameterType::kPoint3, "from", behind);
-    feed.floats(ParameterType::kPoint3, "to", origin);
-  } else if (type == "point" || type == "spot") {
-    feed.begin("LightSource", document_->place(), {type});
-    feed.colour("I", power);
-    feed.floats(ParameterType::kPoint3, "from", origin);
-    if (type == "spot") {
-      feed.floats(ParameterType::kPoint3, "to", ahead);
-      const std::optional<Value> cone = light.find("spot");
-      const double outer = cone ? cone->number_or("outerConeAngle", std::numbers::pi / 4) : std::numbers::pi / 4;
-      const double inner = cone ? cone->number_or("innerConeAngle", 0.0) : 0.0;
-      feed.number("coneangle", static_cast<float>(outer * 180.0 / std::numbers::pi));
-      feed.number("conedeltaangle", static_cast<float>((outer - inner) * 180.0 / std::numbers::pi));
+  feed.with_attributes(document_->place(), [&] {
+    feed.transform("ConcatTransform", document_->place(), placed.world_from_node);
+    if (type == "directional") {
+      feed.begin("LightSource", document_->place(), {"distant"});
+      feed.colour("L", power);
+      feed.floats(ParameterType::kPoint3, "from", behind);
+      feed.floats(ParameterType::kPoint3, "to", origin);
+    } else if (type == "point" || type == "spot") {
+      feed.begin("LightSource", document_->place(), {type});
+      feed.colour("I", power);
+      feed.floats(ParameterType::kPoint3, "from", origin);
+      if (type == "spot") {
+        feed.floats(ParameterType::kPoint3, "to", ahead);
+        const std::optional<Value> cone = light.find("spot");
+        const double outer = cone ? cone->number_or("outerConeAngle", std::numbers::pi / 4) : std::numbers::pi / 4;
+        const double inner = cone ? cone->number_or("innerConeAngle", 0.0) : 0.0;
+        feed.number("coneangle", static_cast<float>(outer * 180.0 / std::numbers::pi));
+        feed.number("conedeltaangle", static_cast<float>((outer - inner) * 180.0 / std::numbers::pi));
+      }
+    } else {
+      light.fail("has an unknown type");
     }
-  } else {
-    light.fail("has an unknown type");
-  }
-  feed.send();
-  feed.begin("AttributeEnd", document_->place());
-  feed.send();
+    feed.send();
+  });
 }
 
 } // namespace packtrace::gltf

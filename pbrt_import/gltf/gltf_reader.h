@@ -7,6 +7,7 @@
 #include "pbrt_import/gltf/gltf_document.h"
 #include "pbrt_import/gltf/gltf_materials.h"
 #include "pbrt_import/gltf/gltf_nodes.h"
+#include "pbrt_import/gltf/gltf_pose.h"
 
 namespace packtrace::gltf {
 
@@ -28,10 +29,11 @@ private:
   struct MeshUse {
     uint64_t mesh = 0;
     DAffine world_from_mesh{1.0};
+    Pose pose;
   };
   void add_camera(const PlacedNode& placed, uint64_t camera, const DAffine& world_from_file);
   void collect_meshes();
-  void add_shapes(const Materials& materials, uint64_t mesh);
+  void add_shapes(const Materials& materials, uint64_t mesh, const Pose& pose);
   void add_light(const PlacedNode& placed, uint64_t light);
   void report(const std::string& problem, std::string_view consequence);
 

@@ -88,9 +88,10 @@ TextureGraph::Node TextureGraph::checkerboard(Node a, Node b, const TextureMappi
 }
 
 uint32_t TextureGraph::request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place,
-                                     uint64_t sequence, std::optional<float> alpha_cutoff) {
+                                     uint64_t sequence, std::optional<float> alpha_cutoff,
+                                     std::optional<float> grey_cutoff) {
   const auto [it, inserted] =
-      image_numbers_.try_emplace({path, decode_srgb, alpha_cutoff}, static_cast<uint32_t>(images_.size()));
+      image_numbers_.try_emplace({path, decode_srgb, alpha_cutoff, grey_cutoff}, static_cast<uint32_t>(images_.size()));
   if (inserted) {
     ImageRequest request;
     request.path = path;
@@ -98,6 +99,7 @@ uint32_t TextureGraph::request_image(const std::filesystem::path& path, bool dec
     request.place = place;
     request.sequence = sequence;
     request.alpha_cutoff = alpha_cutoff;
+    request.grey_cutoff = grey_cutoff;
     images_.push_back(std::move(request));
   }
   return it->second;

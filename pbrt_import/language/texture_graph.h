@@ -25,7 +25,7 @@ struct TextureMapping {
   bool is_uv = true;
 };
 
-/// An image file that textures use. There is one request per file, colour encoding and alpha cutoff.
+/// An image file that textures use. There is one request per file, colour encoding and cutoffs.
 struct ImageRequest {
   std::filesystem::path path;
   bool decode_srgb = false;
@@ -36,6 +36,7 @@ struct ImageRequest {
   bool want_colours = false;
   bool want_radiance = false;          ///< set by users of request_image()
   std::optional<float> alpha_cutoff;   ///< as in ImageWants
+  std::optional<float> grey_cutoff;    ///< as in ImageWants
   std::span<const std::byte> embedded; ///< content of an image within another file; empty: path is a file
   bool missing = false;                ///< missing or unreadable: counts as 1 everywhere, as in pbrt
   ImageSummary summary;                ///< filled in by FileLoader
@@ -57,7 +58,8 @@ public:
 
   /// Returns the index of the request with this path and encoding, which image() takes; adds it if there is none.
   uint32_t request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place, uint64_t sequence,
-                         std::optional<float> alpha_cutoff = std::nullopt);
+                         std::optional<float> alpha_cutoff = std::nullopt,
+                         std::optional<float> grey_cutoff = std::nullopt);
   std::vector<ImageRequest>& images() { return images_; }
 
   /// The Texture directive that defined a node.
@@ -119,7 +121,8 @@ private:
   std::vector<Vec3> averages_; ///< averages of the first nodes, extended on demand
   std::unordered_map<Node, Origin> origins_;
   std::vector<ImageRequest> images_;
-  std::map<std::tuple<std::filesystem::path, bool, std::optional<float>>, uint32_t> image_numbers_;
+  std::map<std::tuple<std::filesystem::path, bool, std::optional<float>, std::optional<float>>, uint32_t>
+      image_numbers_;
 };
 
 } // namespace packtrace

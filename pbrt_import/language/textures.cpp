@@ -56,14 +56,21 @@ TextureMapping read_mapping(const TextureMaker& maker) {
   return mapping;
 }
 
-/// Parameters that pbrt does not have, of images whose holes are in their alpha channel: "string channel" "alpha" with
-/// "float cutoff".
-std::optional<float> read_alpha_cutoff(const TextureMaker& maker) {
-  const std::string channel = maker.directive.parameters.get_string("channel", "rgb");
-  if (channel == "alpha") return maker.finite_float("cutoff", 0.5f);
-  if (channel != "rgb")
-    maker.context.reporter.error(maker.directive.place, "unknown channel " + in_quotes(channel) + "; rgb is used");
-  return std::nullopt;
+/// Parameters that pbrt does not have: "string channel" "alpha" or "grey" with "float cutoff" makes a mask.
+struct Channel {
+  std::optional<float> alpha_cutoff, grey_cutoff;
+};
+
+Channel read_channel(const TextureMaker& maker) {
+  const std::string name = maker.directive.parameters.get_string("channel", "rgb");
+  Channel channel;
+  if (name == "alpha")
+    channel.alpha_cutoff = maker.finite_float("cutoff", 0.5f);
+  else if (name == "grey")
+    channel.grey_cutoff = maker.finite_float("cutoff", 0.5f);
+  else if (name != "rgb")
+    maker.context.reporter.error(maker.directive.place, "unknown channel " + in_quotes(name) + "; rgb is used");
+  return channel;
 }
 
 std::optional<Node> make_imagemap(const TextureMaker& maker) {
@@ -95,8 +102,9 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
   for (char& c : extension)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + 32);
   const bool decode_srgb = list.get_bool("gamma", extension == ".png" || extension == ".tga");
-  const uint32_t image = context.graph.request_image(path, decode_srgb, maker.directive.place,
-                                                     context.reporter.sequence(), read_alpha_cutoff(maker));
+  const Channel channel = read_channel(maker);
+  const uint32_t image = context.graph.request_image(
+      path, decode_srgb, maker.directive.place, context.reporter.sequence(), channel.alpha_cutoff, channel.grey_cutoff);
   std::error_code error;
   ImageRequest& request = context.graph.images()[image];
   request.embedded = context.file_names.embedded(path);

@@ -43,6 +43,22 @@ public:
   /// Executes the directive. Throws like SceneBuilder::handle(); MemoryError with the directive's place.
   void send();
 
+  /// Executes directives between AttributeBegin and AttributeEnd, which is also sent if they throw.
+  template <class Body>
+  void with_attributes(const Place& place, const Body& body) {
+    begin("AttributeBegin", place);
+    send();
+    try {
+      body();
+    } catch (...) {
+      begin("AttributeEnd", place);
+      send();
+      throw;
+    }
+    begin("AttributeEnd", place);
+    send();
+  }
+
   Reporter& reporter() { return reporter_; }
 
 private:

@@ -83,11 +83,9 @@ Place MeshFiles::read() {
   feed.send();
   feed.transform("Transform", places_.front(), world_from_file_);
   for (size_t i = 0; i < files_.size(); ++i) {
-    feed.begin("AttributeBegin", places_[i]); // names of materials and textures end with their file
-    feed.send();
-    with_name(files_[i], [&] { read_file(i); });
-    feed.begin("AttributeEnd", places_[i]);
-    feed.send();
+    feed.with_attributes(places_[i], [&] { // names of materials and textures end with their file
+      with_name(files_[i], [&] { read_file(i); });
+    });
   }
   feed.begin("WorldEnd", places_.back());
   feed.send();

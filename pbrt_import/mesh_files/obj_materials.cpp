@@ -30,6 +30,12 @@ void define_texture(const MtlMaterial& material, std::string_view use, std::stri
   feed.number("udelta", map.offset.x);
   feed.number("vdelta", map.offset.y);
   if (map.clamp) feed.text("wrap", "clamp");
+  if (type == "float" && use == "opacity") { // pbrt's alpha has no values between 0 and 1
+    constexpr float kCutoff = 0.5f;
+    feed.text("channel", "grey");
+    feed.number("cutoff", kCutoff);
+    feed.flag("gamma", false);
+  }
   feed.send();
 }
 

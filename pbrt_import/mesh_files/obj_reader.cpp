@@ -254,18 +254,16 @@ private:
       if (number == distinct.size()) distinct.push_back(corner);
       indices[i] = static_cast<int32_t>(number);
     }
-    feed.begin("AttributeBegin", group.place);
-    feed.send();
-    materials_.use(group.material, group.place, feed);
-    feed.begin("Shape", group.place, {"trianglemesh"});
-    add_attribute(distinct, positions_, &Corner::position, ParameterType::kPoint3, "P");
-    if (group.has_normals) add_attribute(distinct, normals_, &Corner::normal, ParameterType::kNormal, "N");
-    if (group.has_uvs) add_attribute(distinct, uvs_, &Corner::uv, ParameterType::kFloat, "uv");
-    feed.integers("indices", indices);
-    materials_.add_opacity(group.material, feed);
-    feed.send();
-    feed.begin("AttributeEnd", group.place);
-    feed.send();
+    feed.with_attributes(group.place, [&] {
+      materials_.use(group.material, group.place, feed);
+      feed.begin("Shape", group.place, {"trianglemesh"});
+      add_attribute(distinct, positions_, &Corner::position, ParameterType::kPoint3, "P");
+      if (group.has_normals) add_attribute(distinct, normals_, &Corner::normal, ParameterType::kNormal, "N");
+      if (group.has_uvs) add_attribute(distinct, uvs_, &Corner::uv, ParameterType::kFloat, "uv");
+      feed.integers("indices", indices);
+      materials_.add_opacity(group.material, feed);
+      feed.send();
+    });
   }
 
   template <class Vector>

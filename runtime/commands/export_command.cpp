@@ -1,5 +1,7 @@
 #include "runtime/commands/commands.h"
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -10,8 +12,12 @@
 #include <nlohmann/json.hpp>
 
 #include "compress/exchange/gltf/gltf_export.h"
+#include "compress/exchange/scene/obj_export.h"
+#include "compress/exchange/scene/pbrt_export.h"
+#include "compress/exchange/scene/stream_export.h"
 #include "compress/exchange/vertex16/vertex16_export.h"
 #include "pbrt_import/base/file_error.h"
+#include "pbrt_import/base/output_file.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/export_reports.h"
@@ -24,12 +30,14 @@
 namespace packtrace {
 namespace {
 
-constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kDraco = "draco", *kMeshopt = "meshopt",
-                     *kNone = "none", *kPortable = "portable", *kWeb = "web", *kExchange = "exchange";
+constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kPbrt = "pbrt", *kObj = "obj", *kStreams = "streams",
+                     *kDraco = "draco", *kMeshopt = "meshopt", *kNone = "none", *kPortable = "portable", *kWeb = "web",
+                     *kExchange = "exchange";
 
 struct ExportOptions {
   std::string input, output;
-  std::string layout; ///< empty: chosen by the output's extension
+  std::string streams; ///< raw: arrays; empty: none
+  std::string layout;  ///< empty: chosen by the output's extension
   std::string profile = kExchange;
   std::optional<std::string> codec;
   std::optional<int> level, normal_bits, uv_bits;
@@ -41,33 +49,37 @@ struct ExportOptions {
 /// The exported file and its reports.
 struct Exported {
   std::vector<std::byte> bytes;
-  std::vector<std::byte> buffer; ///< beside a .gltf file
+  std::vector<ExportedFile> others; ///< beside the main file
   nlohmann::json json;
   std::string text;
 };
 
-/// The file of a .gltf file's buffer.
-std::filesystem::path buffer_file(const ExportOptions& options) {
-  return std::filesystem::path(options.output).replace_extension(".bin");
-}
-
-/// Returns the layout from --layout, or else the one that the output's extension implies. Throws Error(kUsage) if they
-/// contradict each other or neither is known.
+/// Returns the layout from --layout or --streams, or else the one that the output's extension implies. Throws
+/// Error(kUsage) if they contradict each other or none is known.
 std::string layout_of(const ExportOptions& options) {
+  struct Ending {
+    std::string_view ending;
+    const char* layout;
+  };
+  constexpr std::array<Ending, 6> kEndings = {
+      {{".glb", kGltf}, {".gltf", kGltf}, {".v16", kVertex16}, {".pbrt", kPbrt}, {".obj", kObj}, {".json", kStreams}}};
   const std::string ending = ending_of(options.output);
-  const bool is_gltf = ending == ".glb" || ending == ".gltf";
-  const std::string layout = !options.layout.empty() ? options.layout
-                             : is_gltf               ? kGltf
-                             : ending == ".v16"      ? kVertex16
-                                                     : "";
-  refuse_foreign_ending(options.output, {".glb", ".gltf", ".v16"}, "export", {});
-  if (layout.empty() && options.output == "-")
+  const auto known = std::ranges::find(kEndings, ending, &Ending::ending);
+  refuse_foreign_ending(options.output, {".glb", ".gltf", ".v16", ".pbrt", ".obj", ".json"}, "export", {});
+  const std::string asked = options.streams.empty() ? options.layout : kStreams;
+  if (!options.streams.empty() && !options.layout.empty())
+    throw Error(ErrorKind::kUsage, "--streams and --layout exclude each other");
+  if (asked.empty() && known != kEndings.end() && known->layout != std::string_view(kStreams)) return known->layout;
+  if (asked.empty() && options.output == "-")
     throw Error(ErrorKind::kUsage, "-o - has no extension to choose a layout by; add --layout gltf or vertex16");
-  if (layout.empty())
-    throw FileError(ErrorKind::kUsage, options.output, "use the extension .glb, .gltf or .v16, or add --layout");
-  if ((is_gltf && layout != kGltf) || (ending == ".v16" && layout != kVertex16))
-    throw FileError(ErrorKind::kUsage, options.output, "the extension does not match --layout " + layout);
-  return layout;
+  if (asked.empty())
+    throw FileError(ErrorKind::kUsage, options.output,
+                    "use the extension .glb, .gltf, .v16, .pbrt or .obj, or .json with --streams raw, or add --layout");
+  if (known != kEndings.end() ? asked != known->layout : asked == kStreams)
+    throw FileError(ErrorKind::kUsage, options.output,
+                    asked == kStreams ? "--streams needs an output with the extension .json"
+                                      : "the extension does not match --layout " + asked);
+  return asked;
 }
 
 /// The profile's settings with those that options replace.
@@ -85,7 +97,8 @@ GltfConfig gltf_config(const ExportOptions& options) {
   if (options.webp_psnr) config.webp_psnr = *options.webp_psnr;
   config.instancing |= options.instancing;
   config.levels |= options.levels;
-  if (ending_of(options.output) == ".gltf") config.buffer_name = buffer_file(options).filename().string();
+  if (ending_of(options.output) == ".gltf")
+    config.buffer_name = std::filesystem::path(options.output).filename().replace_extension(".bin").string();
   return config;
 }
 
@@ -100,38 +113,58 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
                     "not a packtrace baked file; create one with packtrace bake SCENE.pbrt -o FILE.ptk");
   const MemoryReservation memory = reserve_decoded(options.input, budget);
   const BakedFile file = BakedFile::open(options.input);
-  ExportNames names{options.input, options.output, {}, {}};
+  ExportNames names{options.input, options.output, {}, {}, {}};
   if (layout == kGltf) {
     const GltfConfig config = gltf_config(options);
     names.profile = options.profile, names.codec = name_of(config.codec);
     GltfExport result = export_gltf(file, config, progress);
-    return {std::move(result.bytes), std::move(result.buffer), to_json(names, result.report),
-            to_text(names, result.report)};
+    std::vector<ExportedFile> others;
+    if (!config.buffer_name.empty()) others.push_back({config.buffer_name, std::move(result.buffer)});
+    return {std::move(result.bytes), std::move(others), to_json(names, result.report), to_text(names, result.report)};
+  }
+  if (layout != kVertex16) {
+    names.layout = layout;
+    const std::string stem = std::filesystem::path(options.output).stem().string();
+    SceneExport result = layout == kPbrt  ? export_pbrt(file, stem, progress)
+                         : layout == kObj ? export_obj(file, stem, progress)
+                                          : export_streams(file, stem, progress);
+    std::vector<std::byte> bytes = std::move(result.files.back().bytes);
+    result.files.pop_back();
+    return {std::move(bytes), std::move(result.files), to_json(names, result.report), to_text(names, result.report)};
   }
   Vertex16Export result = export_vertex16(file, progress);
   return {std::move(result.bytes), {}, to_json(names, result.report), to_text(names, result.report)};
 }
 
+/// Writes the files that belong to the main file, in its folder.
+void write_others(const ExportOptions& options, const std::vector<ExportedFile>& files, bool force) {
+  const std::filesystem::path folder = std::filesystem::path(options.output).parent_path();
+  for (const ExportedFile& file : files) {
+    const std::filesystem::path path = folder / file.name;
+    std::error_code error; // OutputFile reports a folder that is not there
+    if (path.parent_path() != folder) std::filesystem::create_directory(path.parent_path(), error);
+    OutputFile output(path, force);
+    refuse_to_replace({options.input}, path);
+    output.write(file.bytes);
+    output.commit();
+  }
+}
+
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
-  if (layout == kVertex16 && options.has_gltf_option)
+  if (layout != kGltf && options.has_gltf_option)
     throw Error(
         ErrorKind::kUsage,
         "--profile, --codec, --level, --normal-bits, --uv-bits, --webp-psnr, --instancing and --levels only apply "
         "to --layout gltf");
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
-  std::optional<OutputFile> buffer;
-  if (ending_of(options.output) == ".gltf") buffer.emplace(buffer_file(options), globals.force);
   refuse_to_replace({options.input});
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const Exported result = export_file(options, layout, globals.memory, progress);
-  if (buffer) {
-    buffer->write(result.buffer);
-    buffer->commit();
-  }
+  write_others(options, result.others, globals.force);
   output.write(result.bytes);
   display.finish();
   if (json.wanted()) json.write(result.json);
@@ -186,16 +219,23 @@ void add_gltf_options(CLI::App& verb, ExportOptions& options) {
 
 void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
-  CLI::App& verb = add_verb(app, globals, "export", "Convert a .ptk file to glTF or to a GPU vertex layout",
-                            [options, &globals] { return run(*options, globals); });
+  CLI::App& verb =
+      add_verb(app, globals, "export", "Convert a .ptk file to glTF, pbrt-v3, OBJ, arrays or a GPU vertex layout",
+               [options, &globals] { return run(*options, globals); });
   verb.add_option("FILE", options->input, ".ptk file to convert")->required();
-  add_output_option(verb, options->output,
-                    "Output file (required), .glb, .gltf or .v16, or - for standard output together with --layout");
+  add_output_option(
+      verb, options->output,
+      "Output file (required): .glb, .gltf, .v16, .pbrt, .obj, or .json with --streams; or - for standard output "
+      "together with --layout. Files that belong to it are beside it, in NAME_files, or NAME.bin");
   verb.add_option("--layout", options->layout,
                   "Output format. gltf is a glTF 2.0 file with materials, instances, textures and cameras; "
                   "vertex16 has 16 bytes per vertex and 16- or 32-bit indices, for direct upload to a GPU (default: "
                   "gltf for .glb and .gltf, vertex16 for .v16)")
       ->check(one_of({kVertex16, kGltf}));
+  verb.add_option("--streams", options->streams,
+                  "Write what the file stores as arrays: raw makes NumPy files (.npy), which the output, a .json file, "
+                  "describes")
+      ->check(one_of({"raw"}));
   add_gltf_options(verb, *options);
   verb.footer("vertex16 packs position (3 x 21 bits), normal (24), tangent (1 + 8) and uv\n"
               "(2 x 16) of a vertex. docs/vertex16.md describes the file;\n"
@@ -205,6 +245,8 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
               "  packtrace export house.ptk -o house.v16\n"
               "  packtrace export house.ptk -o house.glb --profile web\n"
               "  packtrace export house.ptk -o house.gltf --profile portable\n"
+              "  packtrace export house.ptk -o unpacked/house.pbrt\n"
+              "  packtrace export house.ptk -o house.json --streams raw\n"
               "  packtrace export house.ptk -o - --layout gltf | gltf_viewer /dev/stdin");
 }
 

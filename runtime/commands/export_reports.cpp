@@ -103,4 +103,32 @@ std::string to_text(const ExportNames& names, const GltfReport& r) {
   return text;
 }
 
+nlohmann::json to_json(const ExportNames& names, const SceneReport& r) {
+  return {{"verb", "export"},
+          {"input", names.input},
+          {"output", names.output},
+          {"layout", names.layout},
+          {"shapes", r.shapes},
+          {"objects", r.objects},
+          {"instances", r.instances},
+          {"materials", r.materials},
+          {"images", r.images},
+          {"cameras", r.cameras},
+          {"vertices", r.vertices},
+          {"triangles", r.triangles},
+          {"moving", r.moving != 0},
+          {"bytes", {{"total", r.file_bytes}}},
+          {"peak_rss_bytes", peak_rss_bytes()}};
+}
+
+std::string to_text(const ExportNames& names, const SceneReport& r) {
+  std::string text =
+      fmt::format(grouped(),
+                  "{}: {:L} vertices, {:L} triangles; {:L} shapes, {:L} instances, {:L} materials, {:L} images; "
+                  "{:L} bytes in all files\n",
+                  names.output, r.vertices, r.triangles, r.shapes, r.instances, r.materials, r.images, r.file_bytes);
+  if (r.moving != 0) text += "motion is left out: everything is where it was at the time of the bake\n";
+  return text;
+}
+
 } // namespace packtrace

@@ -11,6 +11,7 @@
 #include "pbrt_import/import_scene.h"
 #include "tests/compress/gltf_test_support.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/compress/world_faces.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -57,26 +58,8 @@ BakedScene bake_again(const std::filesystem::path& path) {
   return bake_for_shading(result.scene);
 }
 
-using WorldFace = std::array<std::array<float, 3>, 3>;
-
-/// Faces of all instances in world space.
-std::multiset<WorldFace> world_faces(const BakedFile& file) {
-  std::multiset<WorldFace> faces;
-  for (uint32_t i = 0; i < file.instances().size(); ++i) {
-    const test::Decoded decoded = test::decode(file, file.instances()[i].geometry);
-    const DAffine map(file.world_from_object(i));
-    for (const Triangle& t : decoded.triangles) {
-      WorldFace face;
-      for (int k = 0; k < 3; ++k) {
-        const DVec3 p = transform_point(map, DVec3(decoded.positions[t[k]]));
-        for (int axis = 0; axis < 3; ++axis)
-          face[static_cast<size_t>(k)][static_cast<size_t>(axis)] = static_cast<float>(p[axis]) + 0.0f;
-      }
-      faces.insert(test::face_of(face));
-    }
-  }
-  return faces;
-}
+using test::world_faces;
+using test::WorldFace;
 
 double largest_step(const BakedFile& file) {
   double step = 0.0;

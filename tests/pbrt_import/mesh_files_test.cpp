@@ -175,6 +175,18 @@ TEST(ObjFiles, TexturesAreFoundBesideTheMaterialFile) {
   EXPECT_EQ(imported.scene.textures[0].wrap, WrapMode::kClamp);
 }
 
+TEST(ObjFiles, OpacityMapsHaveACutoff) {
+  const SceneFolder folder;
+  // 2 x 1 grey pixels, 100 and 200.
+  folder.write("a.tga", std::string("\0\0\3\0\0\0\0\0\0\0\0\0\2\0\1\0\10\0", 18) + "\x64\xc8");
+  folder.write("m.mtl", "newmtl m\nmap_d a.tga\n");
+  const Imported imported = import_file(
+      folder.write("a.obj", "mtllib m.mtl\nusemtl m\n" + std::string(kQuadObj) + "vt 0 0\nf 1/1 2/1 3/1\n"), {});
+  EXPECT_EQ(imported.text(), "");
+  ASSERT_EQ(imported.scene.masks.size(), 1u);
+  EXPECT_EQ(imported.scene.masks[0].words[0], 2u); // the second pixel only
+}
+
 TEST(ObjFiles, MistakesAreReportedWhereTheyAre) {
   const SceneFolder folder;
   folder.write("m.mtl", "Kd 1 1 1\nnewmtl steel\nKd one\nNs\nKd -1 0 0\nmap_Kd\n");

@@ -92,9 +92,14 @@ MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits,
   }
   if (result.indices.empty()) return result;
   meshopt_optimizeVertexCacheStrip(result.indices.data(), result.indices.data(), result.indices.size(), distinct);
-  merged.resize(meshopt_optimizeVertexFetch(merged.data(), result.indices.data(), result.indices.size(), merged.data(),
-                                            distinct, sizeof(StoredVertex)));
-  for (const StoredVertex& vertex : merged) {
+  std::vector<unsigned> order(distinct);
+  const size_t used =
+      meshopt_optimizeVertexFetchRemap(order.data(), result.indices.data(), result.indices.size(), distinct);
+  std::vector<StoredVertex> ordered(used);
+  for (size_t i = 0; i < distinct; ++i)
+    if (order[i] != ~0u) ordered[order[i]] = merged[i];
+  for (uint32_t& index : result.indices) index = order[index];
+  for (const StoredVertex& vertex : ordered) {
     result.lattice.push_back(vertex.lattice);
     if (!plain.normals.empty()) result.normals.push_back(vertex.normal);
     if (keep_uvs && !plain.uvs.empty()) result.uvs.push_back(vertex.uv);

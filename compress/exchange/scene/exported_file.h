@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace packtrace {
+
+/// A file of an export.
+struct ExportedFile {
+  std::string name; ///< relative to the folder of the main file; ASCII, with "/" between folder and file
+  std::vector<std::byte> bytes;
+};
+
+/// Statistics of an export to a scene.
+struct SceneReport {
+  uint64_t shapes = 0, objects = 0, instances = 0, materials = 0, images = 0, cameras = 0;
+  uint64_t vertices = 0, triangles = 0; ///< as stored in the files
+  uint64_t file_bytes = 0;              ///< of all files
+  uint64_t moving = 0;                  ///< 1 if motion is left out: everything is at the time that was baked
+};
+
+/// An export that consists of several files.
+struct SceneExport {
+  std::vector<ExportedFile> files; ///< the main file last
+  SceneReport report;
+};
+
+} // namespace packtrace

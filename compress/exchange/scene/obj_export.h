@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "compress/exchange/scene/exported_file.h"
+#include "compress/format/file/baked_file.h"
+#include "pbrt_import/base/progress.h"
+
+namespace packtrace {
+
+/// Exports a baked file as Wavefront OBJ with an MTL file and PNG images. OBJ has no instances: each becomes a group of
+/// triangles in world space, mirrored along x because OBJ is right-handed.
+/// The bytes depend only on the arguments. Throws Error(kCancelled), Error(kLimitExceeded).
+/// @param stem name of the main file without its ending; STEM.mtl and the folder STEM_files are beside it
+SceneExport export_obj(const BakedFile& file, const std::string& stem, Progress& progress);
+
+} // namespace packtrace

@@ -1,0 +1,179 @@
+// Skins, animated morph targets, and images of glTF files.
+
+#include <cmath>
+#include <cstring>
+
+#include <webp/encode.h>
+
+#include "tests/pbrt_import/gltf_builder.h"
+#include "tests/pbrt_import/image_test_support.h"
+#include "tests/pbrt_import/scene_folder.h"
+
+namespace packtrace {
+namespace {
+
+using Json = nlohmann::json;
+
+Imported import_at(const SceneFolder& folder, const GltfBuilder& gltf, double time = 0.0) {
+  ImportOptions options;
+  options.time = time;
+  options.keep_textures = true;
+  options.keep_shading = true;
+  return import_file(folder.write("a.gltf", gltf.text()), options);
+}
+
+/// A triangle whose first corner hangs on joint 0, the second on joint 1, the third half on each.
+GltfBuilder skinned() {
+  GltfBuilder gltf;
+  const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const size_t normals = gltf.positions({0, 0, 1, 0, 0, 1, 0, 0, 1});
+  const size_t joints = gltf.accessor<uint8_t>("VEC4", 5121, {0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0});
+  const size_t weights = gltf.accessor<float>("VEC4", 5126, {1, 0, 0, 0, 1, 0, 0, 0, .5f, .5f, 0, 0});
+  gltf.mesh(
+      {{"attributes", {{"POSITION", positions}, {"NORMAL", normals}, {"JOINTS_0", joints}, {"WEIGHTS_0", weights}}}});
+  gltf.node({{"mesh", 0}, {"skin", 0}, {"translation", {100, 0, 0}}}); // does not matter
+  gltf.node({{"name", "still"}});
+  gltf.node({{"name", "moving"}, {"translation", {0, 0, 5}}});
+  // The second joint was at (0, 0, 5) when the mesh was bound.
+  const std::vector<float> inverse = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,  1,
+                                      1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -5, 1};
+  const size_t bind =
+      gltf.accessor({{"bufferView", gltf.view(inverse)}, {"componentType", 5126}, {"type", "MAT4"}, {"count", 2}});
+  gltf.json["skins"] = {{{"joints", {1, 2}}, {"inverseBindMatrices", bind}}};
+  const size_t times = gltf.accessor<float>("SCALAR", 5126, {0, 2});
+  const size_t places = gltf.positions({0, 0, 5, 0, 8, 5});
+  gltf.json["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 2}, {"path", "translation"}}}}}},
+                              {"samplers", {{{"input", times}, {"output", places}}}}}};
+  return gltf;
+}
+
+TEST(GltfSkins, VerticesFollowTheirJointsAtATime) {
+  const SceneFolder folder;
+  const Imported bound = import_at(folder, skinned());
+  EXPECT_EQ(bound.text(), "");
+  ASSERT_EQ(bound.scene.shapes.size(), 1u);
+  const std::vector<DVec3> rest = {{0, 0, 0}, {-1, 0, 0}, {0, 1, 0}}; // x is mirrored
+  for (size_t i = 0; i < 3; ++i) EXPECT_LT(glm::distance(placed(bound.scene.shapes[0], bound.scene, i), rest[i]), 1e-6);
+  const Imported later = import_at(folder, skinned(), 1.0); // joint 1 moved by 4
+  const std::vector<DVec3> moved = {{0, 0, 0}, {-1, 4, 0}, {0, 3, 0}};
+  for (size_t i = 0; i < 3; ++i)
+    EXPECT_LT(glm::distance(placed(later.scene.shapes[0], later.scene, i), moved[i]), 1e-6);
+}
+
+TEST(GltfSkins, MistakesAreReported) {
+  const SceneFolder folder;
+  GltfBuilder missing = skinned();
+  missing.json["skins"][0]["joints"] = {1};
+  EXPECT_TRUE(import_at(folder, missing).reported("has a joint that its skin lacks"));
+  GltfBuilder outside = skinned();
+  outside.json["skins"][0]["joints"] = {1, 9};
+  EXPECT_TRUE(import_at(folder, outside).reported("is a node outside the scene"));
+  GltfBuilder unweighted = skinned();
+  unweighted.json["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0");
+  EXPECT_TRUE(import_at(folder, unweighted).reported("has joints without weights"));
+  GltfBuilder few = skinned();
+  few.json["accessors"][few.json["skins"][0]["inverseBindMatrices"].get<size_t>()]["count"] = 1;
+  EXPECT_TRUE(import_at(folder, few).reported("has fewer inverse bind matrices than joints"));
+}
+
+TEST(GltfMorphs, WeightsAreAnimated) {
+  GltfBuilder gltf;
+  const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  Json targets;
+  for (float z = 1.0f; z <= 4.0f; z += 1.0f) // four targets: not a rotation
+    targets.push_back({{"POSITION", gltf.positions({0, 0, z, 0, 0, 0, 0, 0, 0})}});
+  gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"targets", targets}});
+  gltf.json["meshes"][0]["weights"] = {1, 0, 0, 0};
+  gltf.node({{"mesh", 0}});
+  gltf.node({{"mesh", 0}, {"weights", {0, 0, 0, 2}}});
+  gltf.node({{"mesh", 0}});
+  const size_t times = gltf.accessor<float>("SCALAR", 5126, {0, 1});
+  const size_t weights = gltf.accessor<float>("SCALAR", 5126, {0, 0, 0, 0, 2, 0, 4, 0});
+  gltf.json["animations"] = {{{"channels", {{{"sampler", 0}, {"target", {{"node", 2}, {"path", "weights"}}}}}},
+                              {"samplers", {{{"input", times}, {"output", weights}}}}}};
+  const SceneFolder folder;
+  const Imported imported = import_at(folder, gltf, 0.5);
+  EXPECT_EQ(imported.text(), "");
+  ASSERT_EQ(imported.scene.shapes.size(), 3u);
+  EXPECT_FLOAT_EQ(static_cast<float>(placed(imported.scene.shapes[0], imported.scene, 0).z), 1.0f); // the mesh's
+  EXPECT_FLOAT_EQ(static_cast<float>(placed(imported.scene.shapes[1], imported.scene, 0).z), 8.0f); // the node's
+  EXPECT_FLOAT_EQ(static_cast<float>(placed(imported.scene.shapes[2], imported.scene, 0).z), 1.0f + 6.0f);
+}
+
+/// A lossless WebP image of 2 x 1 pixels: red and opaque, blue and transparent.
+std::string webp_image() {
+  const uint8_t pixels[] = {255, 0, 0, 255, 0, 0, 255, 0};
+  WebPConfig config;
+  WebPPicture picture;
+  WebPMemoryWriter writer;
+  WebPConfigInit(&config);
+  WebPPictureInit(&picture);
+  WebPMemoryWriterInit(&writer);
+  config.lossless = config.exact = 1;
+  picture.use_argb = 1;
+  picture.width = 2, picture.height = 1;
+  picture.writer = WebPMemoryWrite;
+  picture.custom_ptr = &writer;
+  EXPECT_TRUE(WebPPictureImportRGBA(&picture, pixels, 8) != 0 && WebPEncode(&config, &picture) != 0);
+  std::string bytes(reinterpret_cast<const char*>(writer.mem), writer.size);
+  WebPMemoryWriterClear(&writer);
+  WebPPictureFree(&picture);
+  return bytes;
+}
+
+GltfBuilder with_material(const Json& material, const std::string& image, const Json& texture) {
+  GltfBuilder gltf;
+  const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const size_t uvs = gltf.accessor<float>("VEC2", 5126, {0, 0, 1, 0, 0, 1});
+  gltf.json["materials"] = Json::array({material});
+  gltf.json["images"] = {{{"bufferView", gltf.view(image)}, {"mimeType", "image/webp"}}};
+  gltf.json["textures"] = Json::array({texture});
+  gltf.mesh({{"attributes", {{"POSITION", positions}, {"TEXCOORD_0", uvs}}}, {"material", 0}});
+  gltf.node({{"mesh", 0}});
+  return gltf;
+}
+
+TEST(GltfImages, WebpHasColoursAndAlpha) {
+  const SceneFolder folder;
+  const Json texture = {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}};
+  GltfBuilder gltf = with_material(
+      {{"alphaMode", "MASK"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}, webp_image(), texture);
+  gltf.json["extensionsRequired"] = {"EXT_texture_webp"};
+  const Imported imported = import_at(folder, gltf);
+  EXPECT_EQ(imported.text(), "");
+  ASSERT_EQ(imported.scene.textures.size(), 1u);
+  EXPECT_EQ(imported.scene.textures[0].rgb, (std::vector<uint8_t>{255, 0, 0, 0, 0, 255}));
+  ASSERT_EQ(imported.scene.masks.size(), 1u);
+  EXPECT_EQ(imported.scene.masks[0].words[0], 1u);
+  EXPECT_LT(glm::distance(only_material(imported).albedo, Vec3(0.5f, 0.0f, 0.5f)), 1e-5f);
+}
+
+TEST(GltfImages, EveryPrefixAndFlippedByteOfWebpEndsWell) {
+  const SceneFolder folder;
+  const std::string good = webp_image();
+  const Json texture = {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}};
+  const Json material = {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}};
+  for (size_t size = 1; size < good.size(); ++size)
+    EXPECT_EQ(import_at(folder, with_material(material, good.substr(0, size), texture)).scene.shapes.size(), 1u)
+        << size;
+  for (size_t i = 0; i < good.size(); ++i) {
+    std::string bad = good;
+    bad[i] = static_cast<char>(bad[i] ^ 0x55);
+    import_at(folder, with_material(material, bad, texture));
+  }
+}
+
+TEST(GltfImages, MetalnessIsReducedToItsMean) {
+  const SceneFolder folder;
+  // Blue is metalness: half of the texels.
+  const Json material = {{"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", 0}}}}}};
+  const Imported half = import_at(folder, with_material(material, webp_image(), {{"source", 0}}));
+  EXPECT_TRUE(half.reported("reduced to their means")) << half.text();
+  EXPECT_EQ(only_material(half).flags & kMetal, kMetal);
+  Json weak = material;
+  weak["pbrMetallicRoughness"]["metallicFactor"] = 0.9;
+  EXPECT_EQ(only_material(import_at(folder, with_material(weak, webp_image(), {{"source", 0}}))).flags & kMetal, 0u);
+}
+
+} // namespace
+} // namespace packtrace
