@@ -117,6 +117,7 @@ private:
         results[i] = simplify_group(members[i], all > kFewTriangles ? kKept : kKeptWhenFew);
         progress_.advance(triangles);
       });
+      give_up(members, results);
     }
     for (size_t i = 0; i < members.size(); ++i)
       finish_group(first_group + static_cast<uint32_t>(i), level, members[i], results[i]);
@@ -166,6 +167,37 @@ private:
     });
   }
 
+  /// Drops the results of groups that kept too many triangles, so that they become terminal. Where the locks of other
+  /// groups held them up and the level shrinks nevertheless, they stay, as groups of the next level lock other points.
+  void give_up(const std::vector<std::vector<uint32_t>>& members, std::vector<SimplifiedGroup>& results) const {
+    uint64_t before = 0, after = 0;
+    for (const SimplifiedGroup& r : results) before += r.source_triangles, after += r.triangles.size();
+    const auto too_many = [](uint64_t kept, uint64_t of) {
+      return static_cast<double>(kept) > kWorthwhile * static_cast<double>(of);
+    };
+    const bool shrinks = !too_many(after, before);
+    for (size_t i = 0; i < results.size(); ++i)
+      if (too_many(results[i].triangles.size(), results[i].source_triangles) && !(shrinks && may_unlock(members[i])))
+        results[i] = {};
+  }
+
+  /// Whether more corners of the group are locked because other groups share them than for ever.
+  bool may_unlock(const std::vector<uint32_t>& members) const {
+    uint64_t shared = 0, for_ever = 0;
+    for (const uint32_t number : members) {
+      const ClusterRange& range = lod_.clusters[number].range;
+      for (uint32_t i = 0; i < range.triangle_count; ++i)
+        for (int corner = 0; corner < 3; ++corner) {
+          const uint32_t p = lod_.vertices[lod_.triangles[range.first_triangle + i][corner]].position;
+          if (locked_for_ever_[p] != 0)
+            ++for_ever;
+          else
+            shared += owner_[p] == kShared;
+        }
+    }
+    return shared > for_ever;
+  }
+
   SimplifiedGroup simplify_group(const std::vector<uint32_t>& members, double kept) const {
     LodGroupInput input{g_,     {lod_.positions, lod_.vertices, lod_.triangles, triangle_errors_, history_},
                         {},     seam_of_kind_,
@@ -176,10 +208,7 @@ private:
       input.clusters.push_back(&c);
       if (c.generating_group != kNoGroup) input.floor = std::max(input.floor, lod_.groups[c.generating_group].error);
     }
-    SimplifiedGroup result = packtrace::simplify_group(input);
-    if (static_cast<double>(result.triangles.size()) > kWorthwhile * static_cast<double>(result.source_triangles))
-      result = {};
-    return result;
+    return packtrace::simplify_group(input);
   }
 
   void finish_group(uint32_t number, uint32_t level, const std::vector<uint32_t>& members,

@@ -11,6 +11,7 @@
 
 #include "compress/bake/clusters/clusterize.h"
 #include "compress/format/cluster/index_codec.h"
+#include "tests/compress/lod/lod_class_meshes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
 
@@ -207,6 +208,15 @@ TEST(ClusterLod, SheetsOfSeveralLayersKeepTheirOutline) {
         }
       EXPECT_GT(tested, 0u);
     }
+}
+
+/// The borders between groups of such meshes are long; locks that never move would hold up the coarse levels.
+TEST(ClusterLod, SpongesSimplifyToAFewTriangles) {
+  for (const ClassMesh& mesh : class_meshes()) {
+    if (mesh.of_class != "sponge") continue;
+    const ClusterLod lod = build_lod(mesh.make()).lod;
+    EXPECT_LE(level_triangles(lod, lod.level_count - 1), 64u) << mesh.name;
+  }
 }
 
 TEST(ClusterLod, SameForAnyThreadCount) {

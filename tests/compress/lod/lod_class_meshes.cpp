@@ -98,26 +98,6 @@ void add_tube(Mesh& mesh, const std::function<DVec3(double)>& curve, uint32_t st
   }
 }
 
-/// Bent strands that grow from a square.
-Mesh strands_of(uint32_t count, uint32_t steps, uint32_t sides, double radius, uint32_t seed) {
-  Random random(seed);
-  Mesh mesh;
-  for (uint32_t i = 0; i < count; ++i) {
-    const DVec3 root(random.uniform(0, 1), random.uniform(0, 1), 0.0);
-    const DVec3 tip =
-        root + DVec3(random.uniform(-0.4f, 0.4f), random.uniform(-0.4f, 0.4f), random.uniform(0.6f, 1.2f));
-    const double curl = random.uniform(0.02f, 0.08f), turns = random.uniform(1.0f, 3.0f);
-    add_tube(
-        mesh,
-        [=](double t) {
-          const double a = 2.0 * M_PI * turns * t;
-          return root + t * (tip - root) + curl * DVec3(std::cos(a), std::sin(a), 0.5 * std::sin(2.0 * a)) * t;
-        },
-        steps, sides, radius);
-  }
-  return mesh;
-}
-
 /// One long thin tube in a knot.
 Mesh knot() {
   Mesh mesh;
@@ -184,6 +164,52 @@ Mesh fans() {
   return mesh;
 }
 
+/// The surface of solid cubes of a cube of side^3: two triangles for each square between a solid and another cube.
+Mesh cubes_mesh(int side, const std::function<bool(const glm::ivec3&)>& is_solid) {
+  const auto solid = [&](const glm::ivec3& p) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (p[axis] < 0 || p[axis] >= side) return false;
+    return is_solid(p);
+  };
+  Mesh mesh;
+  std::map<std::array<int, 3>, uint32_t> numbers;
+  const auto number = [&](const glm::ivec3& p) {
+    const auto [at, is_new] = numbers.try_emplace({p.x, p.y, p.z}, static_cast<uint32_t>(mesh.positions.size()));
+    if (is_new) mesh.positions.push_back(Vec3(p) / static_cast<float>(side));
+    return at->second;
+  };
+  for (int i = 0; i < side * side * side; ++i) {
+    const glm::ivec3 p(i % side, i / side % side, i / side / side);
+    if (!solid(p)) continue;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int step : {-1, 1}) {
+        glm::ivec3 out(0), u(0), v(0);
+        out[axis] = step, u[(axis + 1) % 3] = 1, v[(axis + 2) % 3] = 1;
+        if (solid(p + out)) continue;
+        if (step < 0) std::swap(u, v);
+        const glm::ivec3 at = step > 0 ? p + out : p;
+        const std::array<uint32_t, 4> n = {number(at), number(at + u), number(at + u + v), number(at + v)};
+        mesh.triangles.emplace_back(n[0], n[1], n[2]);
+        mesh.triangles.emplace_back(n[0], n[2], n[3]);
+      }
+  }
+  return mesh;
+}
+
+/// Cubes at random places, many of which meet at edges and corners only.
+Mesh random_cubes() {
+  Random random(9);
+  std::vector<uint8_t> solid(18 * 18 * 18);
+  for (uint8_t& cube : solid) cube = random.uniform(0, 1) < 0.4f;
+  return cubes_mesh(18,
+                    [&](const glm::ivec3& p) { return solid[static_cast<size_t>((p.z * 18 + p.y) * 18 + p.x)] != 0; });
+}
+
+/// A body with tunnels along all axes.
+Mesh tunnels() {
+  return cubes_mesh(33, [](const glm::ivec3& p) { return (p.x % 4 < 2) + (p.y % 4 < 2) + (p.z % 4 < 2) < 2; });
+}
+
 } // namespace
 
 Mesh plate_mesh(uint32_t cells, double thickness, double bend) {
@@ -218,42 +244,36 @@ Mesh plate_mesh(uint32_t cells, double thickness, double bend) {
   return mesh;
 }
 
+Mesh strands_mesh(uint32_t count, uint32_t steps, uint32_t sides, double radius, uint32_t seed) {
+  Random random(seed);
+  Mesh mesh;
+  for (uint32_t i = 0; i < count; ++i) {
+    const DVec3 root(random.uniform(0, 1), random.uniform(0, 1), 0.0);
+    const DVec3 tip =
+        root + DVec3(random.uniform(-0.4f, 0.4f), random.uniform(-0.4f, 0.4f), random.uniform(0.6f, 1.2f));
+    const double curl = random.uniform(0.02f, 0.08f), turns = random.uniform(1.0f, 3.0f);
+    add_tube(
+        mesh,
+        [=](double t) {
+          const double a = 2.0 * M_PI * turns * t;
+          return root + t * (tip - root) + curl * DVec3(std::cos(a), std::sin(a), 0.5 * std::sin(2.0 * a)) * t;
+        },
+        steps, sides, radius);
+  }
+  return mesh;
+}
+
 Mesh sponge_mesh(uint32_t depth) {
   int side = 1;
   for (uint32_t i = 0; i < depth; ++i) side *= 3;
-  const auto solid = [&](const glm::ivec3& p) {
-    for (int axis = 0; axis < 3; ++axis)
-      if (p[axis] < 0 || p[axis] >= side) return false;
+  return cubes_mesh(side, [=](const glm::ivec3& p) {
     for (int scale = 1; scale < side; scale *= 3) {
       int middles = 0;
       for (int axis = 0; axis < 3; ++axis) middles += p[axis] / scale % 3 == 1;
       if (middles >= 2) return false;
     }
     return true;
-  };
-  Mesh mesh;
-  std::map<std::array<int, 3>, uint32_t> numbers;
-  const auto number = [&](const glm::ivec3& p) {
-    const auto [at, is_new] = numbers.try_emplace({p.x, p.y, p.z}, static_cast<uint32_t>(mesh.positions.size()));
-    if (is_new) mesh.positions.push_back(Vec3(p) / static_cast<float>(side));
-    return at->second;
-  };
-  for (int i = 0; i < side * side * side; ++i) {
-    const glm::ivec3 p(i % side, i / side % side, i / side / side);
-    if (!solid(p)) continue;
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int step : {-1, 1}) {
-        glm::ivec3 out(0), u(0), v(0);
-        out[axis] = step, u[(axis + 1) % 3] = 1, v[(axis + 2) % 3] = 1;
-        if (solid(p + out)) continue;
-        if (step < 0) std::swap(u, v);
-        const glm::ivec3 at = step > 0 ? p + out : p;
-        const std::array<uint32_t, 4> n = {number(at), number(at + u), number(at + u + v), number(at + v)};
-        mesh.triangles.emplace_back(n[0], n[1], n[2]);
-        mesh.triangles.emplace_back(n[0], n[2], n[3]);
-      }
-  }
-  return mesh;
+  });
 }
 
 std::vector<ClassMesh> class_meshes() {
@@ -265,11 +285,13 @@ std::vector<ClassMesh> class_meshes() {
       {"flat plate, 1e-4 thick", "plate", [] { return plate_mesh(100, 1e-4, 0.0); }},
       {"bent plate, 1e-3 thick", "plate", [] { return plate_mesh(100, 1e-3, 0.15); }},
       {"bent plate, 1e-4 thick", "plate", [] { return plate_mesh(100, 1e-4, 0.15); }},
-      {"strands of 6 sides", "strands", [] { return strands_of(60, 60, 6, 0.004, 5); }},
-      {"strands of 3 sides", "strands", [] { return strands_of(200, 40, 3, 0.0015, 6); }},
+      {"strands of 6 sides", "strands", [] { return strands_mesh(60, 60, 6, 0.004, 5); }},
+      {"strands of 3 sides", "strands", [] { return strands_mesh(200, 40, 3, 0.0015, 6); }},
       {"knot", "strands", knot},
       {"fence", "strands", fence},
       {"sponge", "sponge", [] { return sponge_mesh(3); }},
+      {"random cubes", "sponge", random_cubes},
+      {"tunnels", "sponge", tunnels},
       {"washer", "open", washer},
       {"fans", "open", fans},
       {"boulder", "organic", boulder},

@@ -21,6 +21,9 @@ std::vector<ClassMesh> class_meshes();
 /// A closed plate of 1 x 0.7 in cells x cells squares on each side, whose middle surface is bent upwards by `bend`.
 Mesh plate_mesh(uint32_t cells, double thickness, double bend);
 
+/// Closed strands of equal radius that grow from the unit square and curl.
+Mesh strands_mesh(uint32_t count, uint32_t steps, uint32_t sides, double radius, uint32_t seed);
+
 /// A Menger sponge of 20^depth cubes. Each square of its surface is two triangles.
 Mesh sponge_mesh(uint32_t depth);
 

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/compress/lod/lod_class_meshes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/lod/surface_distance.h"
 #include "tests/compress/test_scenes.h"
@@ -135,6 +136,17 @@ TEST(LodError, OfTheLastTrianglesIsNotBelowTheDistance) {
   }
 }
 
+/// Small meshes of the classes that lod_benchmark measures.
+std::vector<NamedMesh> small_class_meshes() {
+  return {
+      {"bent plate", [] { return plate_mesh(30, 1e-3, 0.15); }, true},
+      {"very thin plate", [] { return plate_mesh(30, 1e-4, 0.05); }, true},
+      {"sponge", [] { return sponge_mesh(2); }, true},
+      {"strands", [] { return strands_mesh(20, 25, 4, 0.004, 5); }, true},
+  };
+}
+INSTANTIATE_TEST_SUITE_P(Classes, LodErrorOf, testing::ValuesIn(small_class_meshes()),
+                         [](const auto& tested) { return identifier(tested.param.name); });
 INSTANTIATE_TEST_SUITE_P(StressMeshes, LodErrorOf, testing::ValuesIn(stress_meshes()),
                          [](const auto& tested) { return identifier(tested.param.name); });
 
