@@ -240,8 +240,9 @@ TEST(CommandLine, TheDefaultPrecisionKeepsThePicture) {
   EXPECT_TRUE(report.at("promise").at("kept").get<bool>());
   EXPECT_GE(report.at("finer_geometries").get<int>(), 1);
   for (const auto& [input, image] : {std::pair{scene, "float.exr"}, {file, "packed.exr"}}) {
-    const CommandResult render = run_packtrace({"render", input, "-o", bench / image, "--ground-truth", "--spp", "64",
-                                                "--size", "160x90", "--seed", "1", "--aov", "ao", "-q"});
+    const CommandResult render =
+        run_packtrace({"render", input, "-o", bench / image, "--ground-truth", "--spp", "64", "--frames", "16",
+                       "--size", "160x90", "--seed", "1", "--aov", "ao", "-q"});
     ASSERT_EQ(render.exit_code, 0) << render.err;
   }
   const CommandResult compare =
