@@ -29,7 +29,7 @@ public:
   /// @param rays of the first dispatch; set to what the last one's time suggests
   /// @param rays_per_item rays of a work item
   TimedDispatches(Device& device, uint64_t& rays, uint64_t rays_per_item, uint64_t most_items,
-                  const std::function<void(double)>& watch)
+                  const DeviceRays::Watch& watch)
       : device_(device), rays_(rays), rays_per_item_(rays_per_item), watch_(watch),
         most_(std::max(most_items, uint64_t{1})) {}
 
@@ -58,7 +58,7 @@ private:
   Device& device_;
   uint64_t& rays_;
   uint64_t rays_per_item_;
-  const std::function<void(double)>& watch_;
+  const DeviceRays::Watch watch_;
   uint64_t most_;
 };
 
@@ -75,7 +75,6 @@ struct DeviceRays::State {
   GpuScene::State& scene;
   std::shared_ptr<Device> device;
   CameraRecord camera{};
-  std::function<void(double)> watch;
   Buffer cameras, hits, rays, points, counts, sums;
   uint32_t point_count = 0;
   std::unique_ptr<Kernel> camera_kernel, points_kernel, rays_kernel, queue_kernel, nearest_kernel;
@@ -91,7 +90,7 @@ struct DeviceRays::State {
   void make_queue_kernel();
   template <typename Threads>
   DeviceTime run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples,
-                     uint64_t& rays_at_once, const Threads& threads);
+                     uint64_t& rays_at_once, const Threads& threads, const Watch& watch);
   /// Drops kernels that were made for other placements.
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
@@ -113,7 +112,7 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   if (!s.camera_kernel) s.camera_kernel = s.scene.make_kernel(spirv::camera(), kFirstBinding + 3, sizeof(SpanRecord));
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.camera_kernel->bind(kFirstBinding + i, *buffers[i]);
-  TimedDispatches dispatches(*s.device, s.camera_rays, 1, s.most_threads(), s.watch);
+  TimedDispatches dispatches(*s.device, s.camera_rays, 1, s.most_threads(), {});
   return dispatches.all(uint64_t{blocks_of(camera)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
     const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), baked::kVisibleToCamera,
                           keep_rays ? 1u : 0u};
@@ -141,7 +140,9 @@ void DeviceRays::set_points(std::span<const PointRecord> points) {
   update(s.device, s.points, 0, std::as_bytes(points));
 }
 
-void DeviceRays::set_watch(std::function<void(double share)> watch) { state_->watch = std::move(watch); }
+void DeviceRays::release() {
+  for (Buffer* buffer : {&state_->points, &state_->counts, &state_->sums}) *buffer = Buffer();
+}
 
 bool DeviceRays::can_count() const {
   return state_->device->traits().subgroup_size <= kMaxLanes && state_->scene.node_count <= kMaxQueueNodes;
@@ -157,14 +158,14 @@ void DeviceRays::State::make_queue_kernel() {
 /// @param threads function of a number of samples: threads of a point
 template <typename Threads>
 DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples,
-                                      uint64_t& rays_at_once, const Threads& threads) {
+                                      uint64_t& rays_at_once, const Threads& threads, const Watch& watch) {
   DeviceTime time;
   for (uint32_t done = 0; done < samples.sample_count;) {
     OcclusionRecord part = samples;
     part.first_sample = samples.first_sample + done;
     part.sample_count = std::min(samples.sample_count - done, most_samples);
     const uint32_t per_point = threads(part.sample_count);
-    const std::function<void(double)> watch_part = [&](double share) {
+    const Watch watch_part = [&](double share) {
       if (watch) watch((done + share * part.sample_count) / samples.sample_count);
     };
     TimedDispatches dispatches(*device, rays_at_once, part.sample_count, most_threads() / per_point / 2, watch_part);
@@ -179,7 +180,7 @@ DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecor
   return time;
 }
 
-DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples) {
+DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watch& watch) {
   State& s = *state_;
   if (!can_count())
     throw Error(ErrorKind::kUnsupported,
@@ -191,11 +192,11 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples) {
   if (!s.queue_kernel) s.make_queue_kernel();
   s.queue_kernel->bind(kFirstBinding, s.points);
   s.queue_kernel->bind(kFirstBinding + 1, s.counts);
-  return s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_rays,
-                   [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; });
+  const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };
+  return s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_rays, threads, watch);
 }
 
-DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples) {
+DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& watch) {
   State& s = *state_;
   s.follow_scene();
   s.make_room(s.sums, uint64_t{s.point_count} * 2 * sizeof(double), "sums");
@@ -204,7 +205,7 @@ DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples) {
     s.nearest_kernel = s.scene.make_kernel(spirv::occlusion_nearest(), kFirstBinding + 2, sizeof(OcclusionRecord));
   s.nearest_kernel->bind(kFirstBinding, s.points);
   s.nearest_kernel->bind(kFirstBinding + 1, s.sums);
-  return s.run_all(*s.nearest_kernel, samples, kMaxNearestSamples, s.nearest_rays, [](uint32_t) { return 1u; });
+  return s.run_all(*s.nearest_kernel, samples, kMaxNearestSamples, s.nearest_rays, [](uint32_t) { return 1u; }, watch);
 }
 
 uint32_t DeviceRays::point_count() const { return state_->point_count; }

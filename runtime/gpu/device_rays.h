@@ -31,16 +31,19 @@ public:
   /// Uses other points.
   void set_points(std::span<const PointRecord> points);
 
-  /// @param work called before each dispatch with the share of the current call's work that is done; may throw
-  void set_watch(std::function<void(double share)> watch);
+  /// Called before each dispatch with the share of the call's work that is done; may throw.
+  using Watch = std::function<void(double share)>;
 
   /// Whether the device can run count_occluded(): subgroups of at most 32 lanes, and at most 2^24 nodes.
   bool can_count() const;
   /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
   /// Throws Error(kUnsupported) unless can_count().
-  DeviceTime count_occluded(const OcclusionRecord& samples);
+  DeviceTime count_occluded(const OcclusionRecord& samples, const Watch& watch = {});
   /// Sums visibility and distance of the nearest hits of each point's rays up, in the order of the samples.
-  DeviceTime sum_nearest(const OcclusionRecord& samples);
+  DeviceTime sum_nearest(const OcclusionRecord& samples, const Watch& watch = {});
+
+  /// Frees the memory of points and of their results.
+  void release();
 
   uint32_t point_count() const;
   /// By pixel, of trace_camera().

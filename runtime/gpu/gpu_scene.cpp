@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 
+#include "pbrt_import/base/error.h"
 #include "runtime/gpu/gpu_scene_state.h"
 #include "runtime/gpu/shaders/spirv.h"
 
@@ -130,7 +131,13 @@ void GpuScene::State::trace(Kernel& kernel, uint32_t& at_once, std::span<const p
   for (size_t first = 0; first < all.size();) {
     if (between) between();
     const auto count = static_cast<uint32_t>(std::min<size_t>(all.size() - first, at_once));
-    make_room(count, uint64_t{count} * result_bytes);
+    try {
+      make_room(count, uint64_t{count} * result_bytes);
+    } catch (const Error& error) { // fewer rays at once, if there is no room for so many
+      if (error.kind() != ErrorKind::kLimitExceeded || count <= kGroupSize) throw;
+      at_once = count / 2;
+      continue;
+    }
     std::memcpy(rays.data(), all.data() + first, count * sizeof(packed::KernelRay));
     const SpanRecord span{0, count, ray_class, 0};
     const double ms = device->run(kernel, std::as_bytes(std::span(&span, 1)), (count + kGroupSize - 1) / kGroupSize);
@@ -176,6 +183,11 @@ void GpuScene::any(std::span<const packed::KernelRay> rays, uint32_t ray_class, 
                   for (uint32_t i = 0; i < count; ++i)
                     occluded[first + i] = static_cast<uint8_t>(results[i * sizeof(uint32_t)]);
                 });
+}
+
+void GpuScene::release_rays() const {
+  const std::lock_guard lock(state_->mutex);
+  state_->rays = Buffer(), state_->results = Buffer();
 }
 
 std::string GpuScene::device_name() const { return state_->device->name(); }

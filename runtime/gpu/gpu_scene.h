@@ -47,6 +47,9 @@ public:
   /// Finds any hits; see RayTracer::any_hits().
   void any(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<uint8_t> occluded) const;
 
+  /// Frees the memory for rays and hits, which is kept from call to call.
+  void release_rays() const;
+
   std::string device_name() const;
   /// Lanes of a subgroup.
   uint32_t subgroup_size() const;

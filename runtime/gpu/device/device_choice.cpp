@@ -7,6 +7,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/gpu/device/device.h"
+#include "runtime/gpu/device/device_features.h"
 #include "runtime/gpu/device/loader.h"
 #include "runtime/gpu/device/rounding_probe.h"
 
@@ -14,7 +15,6 @@ namespace packtrace::gpu {
 namespace {
 
 constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
-constexpr uint32_t kNeededBindings = 16;
 
 std::vector<VkPhysicalDevice> physical_devices(VkInstance instance) {
   uint32_t count = 0;
@@ -50,30 +50,27 @@ uint32_t compute_family(VkPhysicalDevice device, std::vector<VkQueueFamilyProper
   return family;
 }
 
-/// What a device lacks that kernels need; empty if nothing.
-std::string missing_features(VkPhysicalDevice device) {
-  const VkPhysicalDeviceProperties properties = properties_of(device);
-  if (properties.apiVersion < VK_API_VERSION_1_2) return "Vulkan 1.2";
+VkPhysicalDeviceSubgroupProperties subgroups_of(VkPhysicalDevice device) {
   VkPhysicalDeviceSubgroupProperties subgroups{};
   subgroups.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES;
   VkPhysicalDeviceProperties2 more{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &subgroups, {}};
   vkGetPhysicalDeviceProperties2(device, &more);
+  return subgroups;
+}
+
+DeviceFeatures features_of(VkPhysicalDevice device) {
+  const VkPhysicalDeviceProperties properties = properties_of(device);
+  DeviceFeatures out;
+  out.api_version = properties.apiVersion;
+  if (properties.apiVersion < VK_API_VERSION_1_1) return out; // has no functions to ask for subgroups
   VkPhysicalDeviceFeatures features;
   vkGetPhysicalDeviceFeatures(device, &features);
-  constexpr VkSubgroupFeatureFlags kOperations = VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_VOTE_BIT |
-                                                 VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT |
-                                                 VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
-  std::string missing;
-  const auto need = [&](bool there, const char* name) {
-    if (!there) missing += (missing.empty() ? "" : ", ") + std::string(name);
-  };
-  need(features.shaderInt64 == VK_TRUE, "shaderInt64");
-  need(features.shaderFloat64 == VK_TRUE, "shaderFloat64");
-  need((subgroups.supportedOperations & kOperations) == kOperations, "subgroup ballot, shuffle and arithmetic");
-  need(properties.limits.maxPerStageDescriptorStorageBuffers >= kNeededBindings, "16 storage buffers");
   std::vector<VkQueueFamilyProperties> families;
-  need(compute_family(device, families) < families.size(), "compute queue");
-  return missing;
+  out.int64 = features.shaderInt64 == VK_TRUE, out.float64 = features.shaderFloat64 == VK_TRUE;
+  out.subgroups = subgroups_of(device).supportedOperations;
+  out.storage_buffers = properties.limits.maxPerStageDescriptorStorageBuffers;
+  out.computes = compute_family(device, families) < families.size();
+  return out;
 }
 
 std::string lower_case(std::string text) {
@@ -163,7 +160,7 @@ void Device::choose_device() {
     if (!wanted.empty() && lower_case(properties.deviceName).find(wanted) == std::string::npos) continue;
     const int value = rank(properties.deviceType);
     if (wanted.empty() && value == 0) continue;
-    if (const std::string missing = missing_features(device); !missing.empty()) {
+    if (const std::string missing = missing_features(features_of(device)); !missing.empty()) {
       lacking += (lacking.empty() ? "" : "; ") + std::string(properties.deviceName) + " lacks " + missing;
       continue;
     }
@@ -232,11 +229,7 @@ std::shared_ptr<Device> Device::open(const GpuConfig& config) {
   device->create_instance();
   device->choose_device();
   device->create_device();
-  VkPhysicalDeviceSubgroupProperties subgroups{};
-  subgroups.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES;
-  VkPhysicalDeviceProperties2 more{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &subgroups, {}};
-  vkGetPhysicalDeviceProperties2(device->physical_, &more);
-  device->traits_.subgroup_size = subgroups.subgroupSize;
+  device->traits_.subgroup_size = subgroups_of(device->physical_).subgroupSize;
   if (config.arithmetic == GpuArithmetic::kProbed) probe_rounding(device, device->traits_);
   return device;
 }
@@ -266,7 +259,7 @@ std::vector<std::string> device_names(const GpuConfig& config) {
   volkLoadInstance(instance);
   std::vector<std::string> names;
   for (const VkPhysicalDevice device : physical_devices(instance)) {
-    const std::string missing = missing_features(device);
+    const std::string missing = missing_features(features_of(device));
     names.push_back(properties_of(device).deviceName + (missing.empty() ? std::string() : " (lacks " + missing + ")"));
   }
   vkDestroyInstance(instance, nullptr);

@@ -4,7 +4,11 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <functional>
+#include <utility>
 #include <vector>
+
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 
@@ -15,6 +19,23 @@ static_assert(sizeof(OcclusionPoint) == sizeof(gpu::PointRecord) &&
               offsetof(OcclusionPoint, x_px) == offsetof(gpu::PointRecord, x_px) &&
               offsetof(OcclusionPoint, y_px) == offsetof(gpu::PointRecord, y_px));
 static_assert(sizeof(OcclusionSums) == 2 * sizeof(double));
+
+namespace {
+
+gpu::OcclusionRecord occlusion_record(const OcclusionSamples& samples, uint32_t lanes) {
+  constexpr uint32_t kPerThread = 16;
+  gpu::OcclusionRecord record{};
+  record.first_sample = samples.first, record.sample_count = samples.count;
+  record.per_thread = std::min(samples.count, kPerThread);
+  record.idle_lanes = std::max(lanes / 4, 1u);
+  record.order = gpu::kNetOrder, record.seed = samples.seed;
+  record.tfar = samples.tfar, record.inverse_radius = samples.inverse_radius;
+  record.lambda = samples.lambda, record.darkening = samples.darkening, record.end = samples.end;
+  record.floor = samples.floor, record.scale = samples.scale, record.parabola = samples.parabola;
+  return record;
+}
+
+} // namespace
 
 GpuTracer::GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers)
     : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_) {
@@ -47,32 +68,41 @@ void GpuTracer::trace_view(std::span<const Ray> rays, uint32_t ray_class, std::s
 void GpuTracer::trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
                                 std::span<OcclusionSums> sums, Progress& progress) const {
   assert(sums.size() == points.size());
-  if (points.empty()) return;
-  constexpr uint32_t kPerThread = 16;
-  gpu::OcclusionRecord record{};
-  record.first_sample = samples.first, record.sample_count = samples.count;
-  record.per_thread = std::min(samples.count, kPerThread);
-  record.idle_lanes = std::max(scene_->subgroup_size() / 4, 1u);
-  record.order = gpu::kNetOrder, record.seed = samples.seed;
-  record.tfar = samples.tfar, record.inverse_radius = samples.inverse_radius;
-  record.lambda = samples.lambda, record.darkening = samples.darkening, record.end = samples.end;
-  record.floor = samples.floor, record.scale = samples.scale, record.parabola = samples.parabola;
+  constexpr size_t kLeastPoints = 256;
   const std::lock_guard lock(device_rays_mutex_);
+  size_t at_once = points.size();
   uint64_t reported = 0;
-  const auto report = [&](double share) {
-    const auto done = static_cast<uint64_t>(share * static_cast<double>(points.size()));
-    progress.advance(done - reported);
-    reported = done;
-  };
-  device_rays_->set_watch(report);
-  device_rays_->set_points({reinterpret_cast<const gpu::PointRecord*>(points.data()), points.size()});
+  for (size_t first = 0; first < points.size();) {
+    const size_t count = std::min(points.size() - first, at_once);
+    try {
+      trace_part(points.subspan(first, count), samples, sums.subspan(first, count), [&](double share) {
+        const auto done = std::max(reported, first + static_cast<uint64_t>(share * static_cast<double>(count)));
+        progress.advance(done - std::exchange(reported, done));
+      });
+      first += count;
+    } catch (const Error& error) { // fewer points at once, if there is no room for so many
+      if (error.kind() != ErrorKind::kLimitExceeded || count <= kLeastPoints) throw;
+      at_once = count / 2;
+      device_rays_->release();
+      scene_->release_rays();
+    }
+  }
+}
+
+/// Traces the rays of points for which there is memory, else throws Error(kLimitExceeded).
+/// @param report of the share that is done
+void GpuTracer::trace_part(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                           std::span<OcclusionSums> sums, const std::function<void(double)>& report) const {
+  const gpu::OcclusionRecord record = occlusion_record(samples, scene_->subgroup_size());
+  gpu::DeviceRays& rays = *device_rays_;
+  rays.set_points({reinterpret_cast<const gpu::PointRecord*>(points.data()), points.size()});
   if (samples.nearest) {
-    device_rays_->sum_nearest(record);
-    device_rays_->sums({reinterpret_cast<double*>(sums.data()), 2 * sums.size()});
+    rays.sum_nearest(record, report);
+    rays.sums({reinterpret_cast<double*>(sums.data()), 2 * sums.size()});
   } else {
-    device_rays_->count_occluded(record);
+    rays.count_occluded(record, report);
     std::vector<uint32_t> counts(points.size());
-    device_rays_->counts(counts);
+    rays.counts(counts);
     for (size_t i = 0; i < counts.size(); ++i) {
       const double open = samples.count - counts[i];
       sums[i] = {open, open + 0.5 * counts[i]};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 
@@ -50,6 +51,8 @@ public:
 
 private:
   void upload(const GpuConfig& config);
+  void trace_part(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                  std::span<OcclusionSums> sums, const std::function<void(double)>& report) const;
 
   PackedTracer packed_;
   GpuTables tables_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "runtime/gpu/device/buffer.h"
+#include "runtime/gpu/device/device_features.h"
 #include "runtime/trace/gpu/gpu_tracer.h"
 #include "runtime/trace/make_tracer.h"
 #include "runtime/trace/source/float_source.h"
@@ -44,6 +45,23 @@ TEST(GpuFailures, ALibraryThatIsNoLoader) {
   GpuConfig config;
   config.loader = "libm.so.6";
   EXPECT_EQ(error_of(config).second, "backend gpu: no Vulkan loader (libm.so.6) found; use --backend packed");
+}
+
+/// Each feature is needed, and named where it is missing.
+TEST(GpuFailures, DevicesWithoutTheFeatures) {
+  gpu::DeviceFeatures all;
+  all.api_version = VK_API_VERSION_1_3, all.int64 = all.float64 = all.computes = true;
+  all.subgroups = ~VkSubgroupFeatureFlags{0}, all.storage_buffers = 16;
+  EXPECT_EQ(gpu::missing_features(all), "");
+  gpu::DeviceFeatures one = all;
+  one.float64 = false;
+  EXPECT_EQ(gpu::missing_features(one), "shaderFloat64");
+  one = all, one.api_version = VK_API_VERSION_1_1, one.int64 = false;
+  EXPECT_EQ(gpu::missing_features(one), "Vulkan 1.2, shaderInt64");
+  one = all, one.subgroups = all.subgroups & ~VkSubgroupFeatureFlags{VK_SUBGROUP_FEATURE_SHUFFLE_BIT};
+  EXPECT_EQ(gpu::missing_features(one), "subgroup ballot, shuffle and arithmetic");
+  one = all, one.storage_buffers = 15, one.computes = false;
+  EXPECT_EQ(gpu::missing_features(one), "16 storage buffers per kernel, a compute queue");
 }
 
 class GpuFailuresOnDevice : public test::OnGpu {};

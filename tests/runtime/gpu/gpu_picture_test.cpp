@@ -106,6 +106,32 @@ TEST_F(GpuPictureTest, ProgressReachesTheNumberOfPixels) {
   EXPECT_EQ(reached, kSize.pixels());
 }
 
+/// Where there is no room for the whole picture, its parts follow each other; where there is room for nothing, an error
+/// says so.
+TEST_F(GpuPictureTest, LittleDeviceMemory) {
+  const GpuTracer plenty(baked_.file, baked_.source, config_);
+  const GBuffer expected = primary(plenty.packed());
+  AoConfig config;
+  AoFrame expected_ao, ao;
+  Progress progress;
+  trace_ao(baked_.source, plenty.packed(), expected, config, SamplePlan{}, expected_ao, progress);
+  const uint64_t scene_bytes = plenty.scene().bytes();
+  GpuConfig little = config_;
+  little.memory_limit_bytes = scene_bytes + 180'000; // the picture's points and sums alone have more
+  const GpuTracer tracer(baked_.file, baked_.source, little);
+  EXPECT_EQ(primary(tracer).view_z, expected.view_z);
+  EXPECT_GT(kSize.pixels() * sizeof(OcclusionPoint), 120'000u);
+  trace_ao(baked_.source, tracer, expected, config, SamplePlan{}, ao, progress);
+  EXPECT_EQ(ao.ao, expected_ao.ao);
+  little.memory_limit_bytes = scene_bytes + 10'000; // not even for the staged bytes of the upload
+  try {
+    const GpuTracer least(baked_.file, baked_.source, little);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded) << error.what();
+  }
+}
+
 /// An observer that cancels stops the work between two dispatches.
 TEST_F(GpuPictureTest, CancelInTheMiddle) {
   GpuConfig short_dispatches = config_;

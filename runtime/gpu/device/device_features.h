@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+
+#include "runtime/gpu/device/vulkan_api.h"
+
+namespace packtrace::gpu {
+
+/// What a device offers of what kernels need.
+struct DeviceFeatures {
+  uint32_t api_version = 0;
+  bool int64 = false, float64 = false;
+  VkSubgroupFeatureFlags subgroups = 0;
+  uint32_t storage_buffers = 0; ///< of a kernel
+  bool computes = false;        ///< has a compute queue
+};
+
+/// Names what is missing; empty if nothing.
+std::string missing_features(const DeviceFeatures& device);
+
+} // namespace packtrace::gpu
