@@ -189,6 +189,11 @@ void show_in_window(ImageSize size,
   };
   actions.dropped = [&](const std::string& name) { files.open(name); };
   window.run(frames, actions);
+  if (const InputLatency& latency = window.latency(); latency.count() > 0)
+    outputs.report({{"input_to_picture",
+                     {{"inputs", latency.count()},
+                      {"median_ms", latency.percentile_ms(0.5)},
+                      {"p95_ms", latency.percentile_ms(0.95)}}}});
 }
 
 } // namespace packtrace

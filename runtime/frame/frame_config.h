@@ -32,6 +32,17 @@ enum class FrameView : uint8_t {
   kPbrAo, ///< shading, with ambient occlusion
 };
 
+/// Layers of RenderedImage that may be left out, where no one looks at them, for their memory.
+enum PlainLayer : uint32_t {
+  kAoRawLayer = 1,
+  kDepthLayer = 2,
+  kNormalLayer = 4,
+  kAlbedoLayer = 8,
+  kShadedLayer = 16,
+  kInstanceLayer = 32,
+  kAllPlainLayers = 63,
+};
+
 /// Which levels of detail the rays of a frame meet (docs/lod_runtime.md).
 struct DetailConfig {
   /// Maximum screen-space error in traced pixels, in (0, 1e9]. Unset: level 0 everywhere.
@@ -58,10 +69,11 @@ struct FrameConfig {
   bool jitter = true;
   AoResolution ao_resolution = AoResolution::kFull;
   AoRate ao_rate = AoRate::kFull;
-  bool lod_layers = false;     ///< fill the LOD layers of RenderedImage
-  bool view_layers = false;    ///< fill its views of intermediate results
-  bool surface_layers = false; ///< fill its material flags and clusters
-  bool cost_layers = false;    ///< fill what its camera rays visit; needs the packed tracer
+  bool lod_layers = false;                 ///< fill the LOD layers of RenderedImage
+  uint32_t plain_layers = kAllPlainLayers; ///< bits of PlainLayer: layers to fill besides ao and coverage
+  bool view_layers = false;                ///< fill its views of intermediate results
+  bool surface_layers = false;             ///< fill its material flags and clusters
+  bool cost_layers = false;                ///< fill what its camera rays visit; needs the packed tracer
   FrameView view = FrameView::kAo;
   ShadeConfig shade; ///< of the other views
   // How shaded layers are displayed. No frame depends on it.

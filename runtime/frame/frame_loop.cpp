@@ -143,6 +143,7 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
     report_ = {};
     report_.moved = still_frames_ == 0;
     if (traces(still_frames_)) {
+      if (still_frames_ > 0) layers_.keep(gbuffer_);
       const PrimaryCamera view = view_of(camera, still_frames_);
       trace_camera_rays(view, unseen);
       layers_.add(gbuffer_, scene().source->materials());
@@ -264,6 +265,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   const bool still_jitter = config_.jitters() && !moved;
   const bool trace = traces(still_frames_);
   const PrimaryCamera view = view_of(camera, still_frames_);
+  if (trace && !moved) layers_.keep(gbuffer_);
   if (trace)
     trace_camera_rays(view, progress);
   else if (still_frames_ == 1)
@@ -300,7 +302,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
     if (moved) raw_mean_.clear();
     raw_mean_.add(raw_);
   } else if (still_jitter) {
-    layers_.write_guides(guides_);
+    layers_.write_guides(gbuffer_, guides_);
     denoiser_.add_frame(guides_, raw_, HistorySource::kPixel);
   } else {
     denoiser_.add_frame(shaded, raw_, moved ? HistorySource::kMotion : HistorySource::kUnchanged);
@@ -313,11 +315,12 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
 }
 
 /// The denoised AO, or the mean of the raw AO, of all traced pixels.
-std::vector<float> FrameLoop::accumulated_ao(PictureReport& report) {
+/// @param raw_mean memory for the latter
+std::span<const float> FrameLoop::accumulated_ao(std::vector<float>& raw_mean, PictureReport& report) {
   const Stopwatch denoising;
   if (!config_.denoise) {
     const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
-    return raw_mean_.result(raw_.size, quarter ? half_.gbuffer.instance : layers_.instances());
+    return raw_mean = raw_mean_.result(raw_.size, quarter ? half_.gbuffer.instance : layers_.instances(gbuffer_));
   }
   const DenoisedAo& denoised = denoiser_.denoise();
   denoised_ = &denoised;
@@ -352,25 +355,26 @@ void FrameLoop::turn_lights(float degrees) {
 }
 
 void FrameLoop::show_layers(const FrameConfig& config) {
-  config_.view_layers = config.view_layers;
+  config_.plain_layers = config.plain_layers, config_.view_layers = config.view_layers;
   config_.surface_layers = config.surface_layers, config_.cost_layers = config.cost_layers;
   if (config_.shades() && config.shades()) config_.view = config.view;
 }
 
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   PassTimes& times = report.times;
-  const std::vector<float> ao = accumulated_ao(report);
+  std::vector<float> raw_mean;
+  const std::span<const float> ao = accumulated_ao(raw_mean, report);
   if (config_.ao_resolution == AoResolution::kQuarter) {
     const Stopwatch upsampling;
     const auto [full_ao, raw] = upsample_ao(gbuffer_, half_, {ao, raw_.ao});
     times.upsample_s += upsampling.seconds();
     const Stopwatch filtering;
-    layers_.resolve(config_, full_ao, raw, image);
+    layers_.resolve(config_, gbuffer_, full_ao, raw, image);
     if (config_.shades()) shaded_mean_.resolve(config_, full_ao, image);
     times.resolve_s += filtering.seconds();
   } else {
     const Stopwatch filtering;
-    layers_.resolve(config_, ao, raw_.ao, image);
+    layers_.resolve(config_, gbuffer_, ao, raw_.ao, image);
     if (config_.shades()) shaded_mean_.resolve(config_, ao, image);
     times.resolve_s += filtering.seconds();
   }

@@ -89,7 +89,7 @@ private:
   SamplePlan sample_plan(const GBuffer& shaded, std::span<const float> limits);
   void add_lod_layers(const PrimaryCamera& view);
   void shade_frame(Progress& progress);
-  std::vector<float> accumulated_ao(PictureReport& report);
+  std::span<const float> accumulated_ao(std::vector<float>& raw_mean, PictureReport& report);
   void resolve_views(RenderedImage& image);
   void resolve_surfaces(RenderedImage& image) const;
 

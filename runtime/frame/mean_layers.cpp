@@ -1,6 +1,7 @@
 #include "runtime/frame/mean_layers.h"
 
 #include <algorithm>
+#include <cassert>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -19,60 +20,114 @@ void for_each_image_row(uint32_t height, const Work& work) {
   });
 }
 
+/// Makes the layers that are filled as long as the image has pixels, and the others empty.
+void clear_plain_layers(uint32_t layers, RenderedImage& image) {
+  const size_t n = image.size.pixels();
+  const auto clear = [&](auto& layer, PlainLayer bit, auto value) {
+    if (layers & bit)
+      layer.assign(n, value);
+    else
+      layer = {};
+  };
+  image.ao.assign(n, kInvalidAo), image.coverage.assign(n, 0.0f);
+  clear(image.ao_raw, kAoRawLayer, kInvalidAo);
+  clear(image.depth, kDepthLayer, 0.0f);
+  clear(image.normal, kNormalLayer, Vec3(0));
+  clear(image.albedo, kAlbedoLayer, Vec3(0));
+  clear(image.shaded, kShadedLayer, Vec3(0));
+  clear(image.instance, kInstanceLayer, kNoInstance);
+}
+
 } // namespace
 
-void MeanLayers::clear_sums(ImageSize size, bool emitters) {
-  size_ = size;
+void MeanLayers::clear_sums(ImageSize size) {
   const size_t n = size.pixels();
   hits_.assign(n, 0.0f), depth_.assign(n, 0.0f);
   normal_.assign(n, Vec3(0)), albedo_.assign(n, Vec3(0));
   instance_.assign(n, kNoInstance);
-  emitters_.assign(emitters ? n : 0, 0.0f), emitter_albedo_.assign(emitters ? n : 0, Vec3(0));
+  emitters_.assign(emitters_exist_ ? n : 0, 0.0f), emitter_albedo_.assign(emitters_exist_ ? n : 0, Vec3(0));
+}
+
+/// A frame alone.
+MeanLayers::Sums MeanLayers::sums_of(const GBuffer& g, size_t i) const {
+  Sums sums;
+  if (g.instance[i] == kNoInstance) return sums;
+  sums.hits = 1.0f, sums.instance = g.instance[i];
+  sums.depth += g.view_z[i], sums.normal += g.normal[i], sums.albedo += g.albedo[i]; // so that -0 becomes 0
+  if (emitters_exist_ && emits(materials_[g.material[i]])) sums.emitters = 1.0f, sums.emitter_albedo += g.albedo[i];
+  return sums;
+}
+
+MeanLayers::Sums MeanLayers::sums(const GBuffer& last, size_t i) const {
+  if (!kept()) return sums_of(last, i);
+  Sums sums{hits_[i], depth_[i], 0.0f, normal_[i], albedo_[i], Vec3(0.0f), instance_[i]};
+  if (!emitters_.empty()) sums.emitters = emitters_[i], sums.emitter_albedo = emitter_albedo_[i];
+  return sums;
 }
 
 void MeanLayers::add(const GBuffer& g, std::span<const Material> materials) {
-  if (frames_ == 0) clear_sums(g.size, std::ranges::any_of(materials, emits));
   ++frames_;
   pixel_spread_ = g.pixel_spread;
+  if (frames_ == 1) {
+    kept_ = false;
+    size_ = g.size;
+    materials_ = materials;
+    emitters_exist_ = std::ranges::any_of(materials, emits);
+    return;
+  }
+  assert(kept_);
   for_each_image_row(g.size.height, [&](uint32_t y) {
     const size_t begin = static_cast<size_t>(y) * g.size.width, end = begin + g.size.width;
     for (size_t i = begin; i < end; ++i) {
-      if (g.instance[i] == kNoInstance) continue;
-      if (hits_[i] == 0.0f) instance_[i] = g.instance[i];
+      const Sums added = sums_of(g, i);
+      if (added.hits == 0.0f) continue;
+      if (hits_[i] == 0.0f) instance_[i] = added.instance;
       hits_[i] += 1.0f;
-      depth_[i] += g.view_z[i], normal_[i] += g.normal[i], albedo_[i] += g.albedo[i];
-      if (!emitters_.empty() && emits(materials[g.material[i]]))
-        emitters_[i] += 1.0f, emitter_albedo_[i] += g.albedo[i];
+      depth_[i] += added.depth, normal_[i] += added.normal, albedo_[i] += added.albedo;
+      if (!emitters_.empty()) emitters_[i] += added.emitters, emitter_albedo_[i] += added.emitter_albedo;
     }
   });
 }
 
-void MeanLayers::write_guides(GBuffer& guides) const {
+void MeanLayers::keep(const GBuffer& first) {
+  if (frames_ != 1 || kept_) return;
+  clear_sums(size_);
+  for_each_image_row(size_.height, [&](uint32_t y) {
+    const size_t begin = static_cast<size_t>(y) * size_.width, end = begin + size_.width;
+    for (size_t i = begin; i < end; ++i) {
+      const Sums sums = sums_of(first, i);
+      hits_[i] = sums.hits, depth_[i] = sums.depth, normal_[i] = sums.normal, albedo_[i] = sums.albedo;
+      instance_[i] = sums.instance;
+      if (!emitters_.empty()) emitters_[i] = sums.emitters, emitter_albedo_[i] = sums.emitter_albedo;
+    }
+  });
+  kept_ = true;
+}
+
+void MeanLayers::write_guides(const GBuffer& last, GBuffer& guides) const {
   guides.size = size_;
   guides.pixel_spread = pixel_spread_;
   const size_t n = size_.pixels();
   guides.view_z.resize(n), guides.normal.resize(n);
-  guides.instance = instance_;
+  const std::span<const uint32_t> instance = instances(last);
+  guides.instance.assign(instance.begin(), instance.end());
   guides.motion_px.assign(n, Vec2(0));
   for_each_image_row(size_.height, [&](uint32_t y) {
     const size_t begin = static_cast<size_t>(y) * size_.width, end = begin + size_.width;
     for (size_t i = begin; i < end; ++i) {
-      guides.view_z[i] = hits_[i] > 0.0f ? depth_[i] / hits_[i] : 0.0f;
-      const float length = glm::length(normal_[i]);
-      guides.normal[i] = length > 0.0f ? normal_[i] / length : Vec3(0);
+      const Sums sum = sums(last, i);
+      guides.view_z[i] = sum.hits > 0.0f ? sum.depth / sum.hits : 0.0f;
+      const float length = glm::length(sum.normal);
+      guides.normal[i] = length > 0.0f ? sum.normal / length : Vec3(0);
     }
   });
 }
 
-void MeanLayers::resolve(const FrameConfig& config, std::span<const float> ao, std::span<const float> raw,
-                         RenderedImage& image) const {
-  const uint32_t factor = config.supersample;
+void MeanLayers::resolve(const FrameConfig& config, const GBuffer& last, std::span<const float> ao,
+                         std::span<const float> raw, RenderedImage& image) const {
+  const uint32_t factor = config.supersample, layers = config.plain_layers;
   image.size = config.size;
-  const size_t n = image.size.pixels();
-  image.ao.assign(n, kInvalidAo), image.ao_raw.assign(n, kInvalidAo);
-  image.depth.assign(n, 0.0f), image.coverage.assign(n, 0.0f);
-  image.normal.assign(n, Vec3(0)), image.albedo.assign(n, Vec3(0)), image.shaded.assign(n, Vec3(0));
-  image.instance.assign(n, kNoInstance);
+  clear_plain_layers(layers, image);
   const float rays = static_cast<float>(frames_) * static_cast<float>(factor * factor);
   const auto resolve_pixel = [&](uint32_t x, uint32_t y) {
     const size_t out = static_cast<size_t>(y) * image.size.width + x;
@@ -81,25 +136,26 @@ void MeanLayers::resolve(const FrameConfig& config, std::span<const float> ao, s
     for (uint32_t sub = 0; sub < factor * factor; ++sub) {
       const size_t in = (static_cast<size_t>(y) * factor + sub / factor) * size_.width +
                         static_cast<size_t>(x) * factor + sub % factor;
-      if (hits_[in] == 0.0f) continue;
-      if (hits == 0.0f) image.instance[out] = instance_[in];
-      hits += hits_[in], depth += depth_[in];
-      if (ao[in] >= 0.0f) ao_hits += hits_[in], ao_sum += hits_[in] * ao[in];
+      const Sums s = sums(last, in);
+      if (s.hits == 0.0f) continue;
+      if (hits == 0.0f && (layers & kInstanceLayer)) image.instance[out] = s.instance;
+      hits += s.hits, depth += s.depth;
+      if (ao[in] >= 0.0f) ao_hits += s.hits, ao_sum += s.hits * ao[in];
       if (raw[in] >= 0.0f) raw_hits += 1.0f, raw_sum += raw[in];
-      normal += normal_[in], albedo += albedo_[in];
+      normal += s.normal, albedo += s.albedo;
       const float light = std::max(ao[in], 0.0f);
-      shaded +=
-          emitters_.empty() ? albedo_[in] * light : Vec3(emitters_[in]) + (albedo_[in] - emitter_albedo_[in]) * light;
+      shaded += emitters_exist_ ? Vec3(s.emitters) + (s.albedo - s.emitter_albedo) * light : s.albedo * light;
     }
     if (hits == 0.0f) return;
     const float scale = 1.0f / hits;
-    if (ao_hits > 0.0f) image.ao[out] = ao_sum * (1.0f / ao_hits);
-    image.depth[out] = depth * scale;
-    if (raw_hits > 0.0f) image.ao_raw[out] = raw_sum * (1.0f / raw_hits);
     image.coverage[out] = hits / rays;
+    if (ao_hits > 0.0f) image.ao[out] = ao_sum * (1.0f / ao_hits);
+    if (raw_hits > 0.0f && (layers & kAoRawLayer)) image.ao_raw[out] = raw_sum * (1.0f / raw_hits);
+    if (layers & kDepthLayer) image.depth[out] = depth * scale;
     const float length = glm::length(normal);
-    image.normal[out] = length > 0 ? normal / length : Vec3(0);
-    image.albedo[out] = albedo * scale, image.shaded[out] = shaded * scale;
+    if (layers & kNormalLayer) image.normal[out] = length > 0 ? normal / length : Vec3(0);
+    if (layers & kAlbedoLayer) image.albedo[out] = albedo * scale;
+    if (layers & kShadedLayer) image.shaded[out] = shaded * scale;
   };
   for_each_image_row(image.size.height, [&](uint32_t y) {
     for (uint32_t x = 0; x < image.size.width; ++x) resolve_pixel(x, y);

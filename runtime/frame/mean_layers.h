@@ -16,24 +16,43 @@ public:
   /// Forgets all frames.
   void clear() { frames_ = 0; }
 
-  /// Adds a frame. Its size must be that of the other frames since clear().
+  /// Adds a frame. Its size must be that of the other frames since clear(). The first frame takes no memory: it is read
+  /// from its G-buffer.
   void add(const GBuffer& gbuffer, std::span<const Material> materials);
+  /// Makes the sums of the first frame, before its G-buffer changes.
+  void keep(const GBuffer& first);
 
   /// Writes the mean surface of each traced pixel: depth, unit normal, and the instance of its first hit. Other fields
   /// of the G-buffer are left empty, except motion_px, which is 0.
-  void write_guides(GBuffer& guides) const;
+  /// @param last of the last add()
+  void write_guides(const GBuffer& last, GBuffer& guides) const;
 
   /// Instance of each traced pixel's first hit; kNoInstance where all frames miss.
-  std::span<const uint32_t> instances() const { return instance_; }
+  /// @param last of the last add()
+  std::span<const uint32_t> instances(const GBuffer& last) const { return kept() ? instance_ : last.instance; }
 
-  /// Box-filters the layers into an image. LOD layers stay as they are.
+  /// Box-filters the layers into an image. LOD layers stay as they are, and layers that FrameConfig::plain_layers does
+  /// not have become empty.
+  /// @param last of the last add()
   /// @param ao, raw one value per traced pixel; negative: none, which is black in RenderedImage::shaded
-  void resolve(const FrameConfig& config, std::span<const float> ao, std::span<const float> raw,
+  void resolve(const FrameConfig& config, const GBuffer& last, std::span<const float> ao, std::span<const float> raw,
                RenderedImage& image) const;
 
 private:
-  void clear_sums(ImageSize size, bool emitters);
+  /// Sums of a traced pixel.
+  struct Sums {
+    float hits = 0.0f, depth = 0.0f, emitters = 0.0f;
+    Vec3 normal{0.0f}, albedo{0.0f}, emitter_albedo{0.0f};
+    uint32_t instance = kNoInstance;
+  };
+  void clear_sums(ImageSize size);
+  bool kept() const { return frames_ > 1 || kept_; }
+  Sums sums_of(const GBuffer& gbuffer, size_t pixel) const;
+  Sums sums(const GBuffer& last, size_t pixel) const;
 
+  bool kept_ = false; ///< the sums below are those of the first frame
+  std::span<const Material> materials_;
+  bool emitters_exist_ = false;
   ImageSize size_;
   uint32_t frames_ = 0;
   float pixel_spread_ = 0.0f; ///< of the frames

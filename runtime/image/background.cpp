@@ -9,6 +9,9 @@
 #include <optional>
 #include <utility>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include "pbrt_import/base/closest_name.h"
 #include "pbrt_import/base/error.h"
 
@@ -84,28 +87,31 @@ Background parse_background(std::string_view text) {
                                      did_you_mean_text(closest_name(lower, known)));
 }
 
-Image over_background(const Image& preview, std::span<const float> coverage, const Background& background) {
+Image over_background(Image preview, std::span<const float> coverage, const Background& background) {
   assert(preview.channels == 3 && coverage.size() == preview.size.pixels());
   const bool transparent = background.kind == Background::Kind::kTransparent;
-  Image result(preview.size, transparent ? 4 : 3);
-  for (uint32_t y = 0; y < preview.size.height; ++y) {
-    const Vec3 behind =
-        background.kind == Background::Kind::kSky ? display_from_linear(sky(y, preview.size.height)) : background.color;
-    for (uint32_t x = 0; x < preview.size.width; ++x) {
-      const float covered = coverage[size_t{y} * preview.size.width + x];
-      const std::span<const float> from = preview.pixel(x, y);
-      const std::span<float> to = result.pixel(x, y);
-      Vec3 color(from[0], from[1], from[2]);
-      if (transparent)
-        to[3] = covered;
-      else if (covered <= 0.0f)
-        color = behind;
-      else if (covered < 1.0f)
-        color = display_from_linear(glm::mix(linear_from_display(behind), linear_from_display(color), covered));
-      std::copy_n(&color.x, 3, to.begin());
+  Image with_alpha;
+  if (transparent) with_alpha = Image(preview.size, 4);
+  tbb::parallel_for(tbb::blocked_range<uint32_t>(0, preview.size.height, 16), [&](const auto& rows) {
+    for (uint32_t y = rows.begin(); y < rows.end(); ++y) {
+      const Vec3 behind = background.kind == Background::Kind::kSky ? display_from_linear(sky(y, preview.size.height))
+                                                                    : background.color;
+      for (uint32_t x = 0; x < preview.size.width; ++x) {
+        const float covered = coverage[size_t{y} * preview.size.width + x];
+        const std::span<const float> from = preview.pixel(x, y);
+        const std::span<float> to = transparent ? with_alpha.pixel(x, y) : preview.pixel(x, y);
+        Vec3 color(from[0], from[1], from[2]);
+        if (transparent)
+          to[3] = covered;
+        else if (covered <= 0.0f)
+          color = behind;
+        else if (covered < 1.0f)
+          color = display_from_linear(glm::mix(linear_from_display(behind), linear_from_display(color), covered));
+        std::copy_n(&color.x, 3, to.begin());
+      }
     }
-  }
-  return result;
+  });
+  return transparent ? with_alpha : preview;
 }
 
 } // namespace packtrace

@@ -33,6 +33,6 @@ Background parse_background(std::string_view text);
 /// @param coverage one value per pixel, in [0,1]
 /// @return display values with three channels; for kTransparent four channels, where alpha is the coverage and colours
 ///         are not premultiplied
-Image over_background(const Image& preview, std::span<const float> coverage, const Background& background);
+Image over_background(Image preview, std::span<const float> coverage, const Background& background);
 
 } // namespace packtrace

@@ -68,11 +68,12 @@ void LayeredDenoiser::add_to_history() {
   g.previous_z.clear();
   if (g.albedo.empty()) g.albedo.assign(g.size.pixels(), Vec3(0)); // MeanLayers adds it up
   means_.add(g, {});
+  means_.keep(g);
   if (result_->start != HistoryStart::kContinued) {
     denoiser_.add_frame(g, picture.ao);
     return;
   }
-  means_.write_guides(guides_);
+  means_.write_guides(g, guides_);
   denoiser_.add_frame(guides_, picture.ao, HistorySource::kPixel);
 }
 

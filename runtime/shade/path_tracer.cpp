@@ -131,7 +131,7 @@ private:
       m.shadows.clear(), m.rays.clear(), m.next.clear();
       for (const PathVertex& vertex : m.vertices) shade({vertex, number, sample}, m);
       rays += m.shadows.size() + m.rays.size();
-      m.shadows.trace(tracer_, surfaces_, scene_.transmits(), config_.shadow_depth, [&](uint32_t pixel, Vec3 radiance) {
+      m.shadows.trace(tracer_, surfaces_, scene_.glass(), config_.shadow_depth, [&](uint32_t pixel, Vec3 radiance) {
         (number == 0 ? m.pixels[pixel].direct : m.pixels[pixel].specular) += radiance;
       });
       follow(m);

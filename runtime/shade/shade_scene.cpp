@@ -1,5 +1,6 @@
 #include "runtime/shade/shade_scene.h"
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <tuple>
@@ -16,7 +17,7 @@ ShadeScene::ShadeScene(const SceneSource& source) : lights_(source) {
   std::vector<SurfaceShading> distinct;
   for (const Material& material : source.materials()) {
     const SurfaceShading& s = material.shading;
-    transmits_ = transmits_ || s.transmits();
+    if (s.transmits()) glass_ = std::max(glass_, occludes(material.flags) ? Glass::kPartial : Glass::kClear);
     const auto [it, inserted] =
         numbers.try_emplace({s.fresnel(), s.eta, s.roughness, key(s.specular), key(s.metal_eta), key(s.metal_k)},
                             static_cast<uint32_t>(distinct.size()));

@@ -5,6 +5,7 @@
 
 #include "runtime/shade/bsdf.h"
 #include "runtime/shade/light_set.h"
+#include "runtime/shade/shadow_rays.h"
 
 namespace packtrace {
 
@@ -18,14 +19,14 @@ public:
   /// LightSet::turn().
   void turn_lights(float degrees) { lights_.turn(degrees); }
   const DirectionalAlbedo& albedo(uint32_t material) const { return albedos_[albedo_of_[material]]; }
-  /// Whether light may pass through some surface.
-  bool transmits() const { return transmits_; }
+  /// What light may pass.
+  Glass glass() const { return glass_; }
 
 private:
   LightSet lights_;
   std::vector<uint32_t> albedo_of_; ///< by material
   std::vector<DirectionalAlbedo> albedos_;
-  bool transmits_ = false;
+  Glass glass_ = Glass::kNone;
 };
 
 } // namespace packtrace

@@ -8,7 +8,9 @@ namespace packtrace {
 namespace {
 
 /// Fraction of light that passes a surface straight on.
-Vec3 passed(const ShadedSurface& surface, const HitPoint& point, Vec3 direction) {
+Vec3 passed(const Material& material, const HitPoint& point, Vec3 direction) {
+  const ShadedSurface surface(material.shading, point.albedo);
+  if (!surface.transmits()) return Vec3(occludes(material.flags) ? 0.0f : 1.0f);
   const float cosine = std::clamp(-glm::dot(direction, point.normal), 0.0f, 1.0f);
   if (surface.shading.bits & kThin) return surface.transmission;
   if (surface.shading.fresnel() != kFresnelDielectric) return surface.transmission;
@@ -18,7 +20,7 @@ Vec3 passed(const ShadedSurface& surface, const HitPoint& point, Vec3 direction)
 
 } // namespace
 
-/// Follows the rays that nothing opaque blocks through the surfaces that transmit light.
+/// Follows the rays that are not blocked yet through the surfaces that transmit light.
 void ShadowRays::pass_glass(const RayTracer& tracer, const HitSurfaces& surfaces, uint32_t shadow_depth) {
   open_.clear(), open_rays_.clear();
   for (uint32_t i = 0; i < rays_.size(); ++i)
@@ -40,8 +42,7 @@ void ShadowRays::pass_glass(const RayTracer& tracer, const HitSurfaces& surfaces
     for (size_t i = 0; i < valid_.size(); ++i) {
       const uint32_t ray = open_rays_[i];
       const HitPoint& point = points_[i];
-      const ShadedSurface surface(surfaces.material(point).shading, point.albedo);
-      const Vec3 through = surface.transmits() ? passed(surface, point, hit_rays_[i].direction) : Vec3(1.0f);
+      const Vec3 through = passed(surfaces.material(point), point, hit_rays_[i].direction);
       carried_[ray].radiance *= through;
       const Ray& before = hit_rays_[i];
       const Ray after = surfaces.leaving(point, before.direction, before.tfar - valid_[i].t);

@@ -7,6 +7,13 @@
 
 namespace packtrace {
 
+/// What light may pass in a scene.
+enum class Glass : uint8_t {
+  kNone,    ///< nothing
+  kClear,   ///< surfaces that occlusion rays do not meet (kTransmissive)
+  kPartial, ///< also surfaces that occlude, such as those with an opacity between 0 and 1
+};
+
 /// Rays along which light comes to the surfaces of a tile, with what they carry.
 class ShadowRays {
 public:
@@ -22,14 +29,13 @@ public:
 
   /// Traces the rays and calls arrive(pixel, radiance) for those that nothing opaque blocks, in their order. Surfaces
   /// that transmit light colour it.
-  /// @param glass whether the scene has such surfaces
   /// @param shadow_depth number of them that light passes
   template <class Arrive>
-  void trace(const RayTracer& tracer, const HitSurfaces& surfaces, bool glass, uint32_t shadow_depth,
+  void trace(const RayTracer& tracer, const HitSurfaces& surfaces, Glass glass, uint32_t shadow_depth,
              const Arrive& arrive) {
-    occluded_.resize(rays_.size());
-    tracer.any_hits(rays_, kOcclusionRays, RayOrder::kIncoherent, occluded_);
-    if (glass) pass_glass(tracer, surfaces, shadow_depth);
+    occluded_.assign(rays_.size(), 0);
+    if (glass != Glass::kPartial) tracer.any_hits(rays_, kOcclusionRays, RayOrder::kIncoherent, occluded_);
+    if (glass != Glass::kNone) pass_glass(tracer, surfaces, shadow_depth);
     for (size_t i = 0; i < rays_.size(); ++i)
       if (occluded_[i] == 0) arrive(carried_[i].pixel, carried_[i].radiance);
   }

@@ -21,8 +21,6 @@ constexpr double kMaxSeconds = 0.2;
 /// Pixels up to which the two panes are compared in every picture that is shown.
 constexpr size_t kLiveMetrics = size_t{1} << 20;
 
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
 std::vector<uint8_t> bytes_of(const Image& picture) {
   std::vector<uint8_t> bytes(picture.data.size());
   std::ranges::transform(picture.data, bytes.begin(),
@@ -31,6 +29,10 @@ std::vector<uint8_t> bytes_of(const Image& picture) {
 }
 
 } // namespace
+
+double input_clock_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 FrameThread::FrameThread(Host host) : host_(std::move(host)) {
   thread_ = std::thread([this] {
@@ -57,6 +59,7 @@ void FrameThread::post(Task task, Urgency urgency) {
   {
     const std::lock_guard lock(mutex_);
     tasks_.push_back(std::move(task));
+    if (urgency == Urgency::kMoves && !input_s_) input_s_ = input_clock_s();
     if (urgency == Urgency::kNow || (urgency == Urgency::kMoves && refining_)) stop_ = true;
   }
   wake_.notify_all();
@@ -129,6 +132,8 @@ bool FrameThread::run_tasks() {
     if (quit_) return false;
     stop_ = false;
     tasks.swap(tasks_);
+    if (!started_input_s_) started_input_s_ = input_s_;
+    input_s_.reset();
   }
   for (const Task& task : tasks) try {
       task(*session_, *controls_);
@@ -149,9 +154,9 @@ void FrameThread::load() {
 
 void FrameThread::run() {
   load();
-  double last_s = now_s();
+  double last_s = input_clock_s();
   while (run_tasks()) {
-    const double start_s = now_s();
+    const double start_s = input_clock_s();
     controls_->advance(std::min(start_s - last_s, kMaxSeconds));
     last_s = start_s;
     render();
@@ -191,7 +196,7 @@ bool FrameThread::worth_showing() const {
   const uint32_t still_frames = session_->last().still_frames;
   if (session_->last().moving || published_ == 0) return true;
   if (still_frames < kHeldFrames) return !moved_;
-  return still_frames <= kEagerFrames || now_s() - last_shown_s_ >= kShowSeconds;
+  return still_frames <= kEagerFrames || input_clock_s() - last_shown_s_ >= kShowSeconds;
 }
 
 void FrameThread::publish(double step_ms) {
@@ -222,12 +227,14 @@ void FrameThread::publish(double step_ms) {
   if (pick_ && (*pick_)[0] < s.size().width && (*pick_)[1] < s.size().height)
     shown->pick = s.pick(s.pane_at((*pick_)[0]), (*pick_)[0], (*pick_)[1]);
   if (contents_shown_) shown->contents = s.contents(0);
+  // What came while the frame was rendered is shown by a later one.
+  if (started_input_s_ && s.last().moving) shown->input_s = started_input_s_, started_input_s_.reset();
   shown->number = ++published_;
   shown->frame_ms = step_ms + 1e3 * watch.seconds();
   session_->add_frame_time(shown->frame_ms);
   republish_ = false;
   snapshot_ = shown;
-  last_shown_s_ = now_s();
+  last_shown_s_ = input_clock_s();
   moved_ = s.last().moving;
 }
 
@@ -241,7 +248,7 @@ void FrameThread::wait_for_work() {
   }
   if (finished) wake_.wait(lock, [this] { return quit_ || !tasks_.empty() || republish_; });
   const bool again = republish_ && session_->last().report.frames > 0 && !session_->last().moving &&
-                     (finished || now_s() - last_shown_s_ > kShowSeconds / 2);
+                     (finished || input_clock_s() - last_shown_s_ > kShowSeconds / 2);
   lock.unlock();
   if (again && session_->last().still_frames >= (moved_ ? kHeldFrames : 1)) publish(0.0);
 }

@@ -25,6 +25,9 @@ struct ViewSnapshot {
   std::vector<uint8_t> rgb;
   ViewFrame frame;
   double frame_ms = 0.0; ///< wall time of the frame with its picture
+  /// When the first input came that this picture shows and none before did, as input_clock_s(); none: it shows no new
+  /// input.
+  std::optional<double> input_s;
   std::vector<std::string> files;
   std::array<std::string, 2> layers;
   std::array<size_t, 2> pane_files{};
@@ -39,6 +42,9 @@ struct ViewSnapshot {
   std::optional<DifferenceMetrics> metrics;
   std::string command; ///< of the first pane; empty while something moves
 };
+
+/// A clock for the time from an input to its picture, in seconds.
+double input_clock_s();
 
 /// Makes a session and renders its frames in a thread of its own, so that a window can answer meanwhile. Everything
 /// that changes the session runs in this thread between frames.
@@ -112,12 +118,14 @@ private:
   std::string message_;
   std::pair<std::string, double> loading_{"loading", 0.0};
   bool contents_shown_ = false;
-  bool republish_ = false; ///< the pick or contents_shown_ changed
+  std::optional<double> input_s_; ///< of the oldest movement that is not shown yet
+  bool republish_ = false;        ///< the pick or contents_shown_ changed
   std::shared_ptr<const ViewSnapshot> snapshot_;
   std::exception_ptr failure_;
-  std::atomic<bool> quit_{false};     ///< end the thread
-  std::atomic<bool> stop_{false};     ///< end the frame
-  std::atomic<bool> refining_{false}; ///< the frame refines a still picture
+  std::atomic<bool> quit_{false};         ///< end the thread
+  std::atomic<bool> stop_{false};         ///< end the frame
+  std::atomic<bool> refining_{false};     ///< the frame refines a still picture
+  std::optional<double> started_input_s_; ///< of the thread: the same, of those that the next frame shows
   bool blocked_ = false;
   bool moved_ = false; ///< the frame that was published last was moving
   double last_shown_s_ = 0.0;

@@ -149,7 +149,8 @@ Image layer_preview(const RenderedImage& image, const std::string& aov, const Pr
   const Background usual =
       picture ? Background{Background::Kind::kSky, Vec3(0)} : Background{Background::Kind::kColor, kDefaultBackground};
   Image preview = plain_preview(image, aov);
-  if (!has_cost_layer({aov})) preview = over_background(preview, image.coverage, style.background.value_or(usual));
+  if (!has_cost_layer({aov}))
+    preview = over_background(std::move(preview), image.coverage, style.background.value_or(usual));
   if (!style.legend) return preview;
   if (aov == "depth") return with_legend(preview, depth_legend(image));
   if (aov == "lod") return with_legend(preview, level_legend(image));

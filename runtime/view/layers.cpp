@@ -97,6 +97,18 @@ bool has_view_layer(const std::vector<std::string>& layers) {
          std::ranges::any_of(layers, [](const std::string& layer) { return contains(kTracedViews, layer); });
 }
 
+uint32_t plain_layers_of(const std::string& layer) {
+  static constexpr std::array<std::pair<const char*, PlainLayer>, 6> kLayers{{{"ao_raw", kAoRawLayer},
+                                                                              {"depth", kDepthLayer},
+                                                                              {"normal", kNormalLayer},
+                                                                              {"albedo", kAlbedoLayer},
+                                                                              {"shaded", kShadedLayer},
+                                                                              {"instance", kInstanceLayer}}};
+  for (const auto& [name, bit] : kLayers)
+    if (layer == name) return bit;
+  return 0;
+}
+
 bool has_shaded_layer(const std::vector<std::string>& layers) {
   return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kShadedLayers, layer); });
 }

@@ -32,6 +32,9 @@ std::vector<std::string> chosen_exr_layers(const std::vector<std::string>& aovs,
 bool has_view_layer(const std::vector<std::string>& layers);
 bool has_denoiser_layer(const std::vector<std::string>& layers);
 
+/// The FrameConfig::plain_layers that showing a layer needs.
+uint32_t plain_layers_of(const std::string& layer);
+
 /// Whether one of the layers needs a shaded image.
 bool has_shaded_layer(const std::vector<std::string>& layers);
 

@@ -83,6 +83,22 @@ void PaneRenderer::next_frame(const Camera& camera, double time_s, Progress& pro
   report_.add(loop_->next_frame(camera, time_s, progress));
 }
 
-void PaneRenderer::resolve() { loop_->resolve(image_, report_); }
+void PaneRenderer::resolve() {
+  loop_->resolve(image_, report_);
+  complete_ = loop_->config().plain_layers == kAllPlainLayers;
+}
+
+void PaneRenderer::complete() {
+  if (complete_) return;
+  const FrameConfig shown = loop_->config();
+  FrameConfig all = shown;
+  all.plain_layers = kAllPlainLayers;
+  all.view_layers = all.surface_layers = all.cost_layers = false; // they stay as they are
+  loop_->show_layers(all);
+  PictureReport seen_before;
+  loop_->resolve(image_, seen_before);
+  loop_->show_layers(shown);
+  complete_ = true;
+}
 
 } // namespace packtrace

@@ -52,8 +52,10 @@ public:
 
   /// Renders a frame. Throws like FrameLoop::next_frame().
   void next_frame(const Camera& camera, double time_s, Progress& progress);
-  /// Writes image() from the frames so far.
+  /// Writes image() from the frames so far, with the layers of the configuration.
   void resolve();
+  /// Adds the FrameConfig::plain_layers that resolve() left out.
+  void complete();
 
   const RenderedImage& image() const { return image_; }
   const FrameLoop& loop() const { return *loop_; }
@@ -68,6 +70,7 @@ private:
   MemoryReservation memory_;
   std::unique_ptr<FrameLoop> loop_;
   RenderedImage image_;
+  bool complete_ = false; ///< image_ has all plain layers
   PictureReport report_;
 };
 

@@ -1,15 +1,35 @@
 #include "runtime/view/pick.h"
 
+#include <algorithm>
 #include <cassert>
 
 #include <fmt/format.h>
 
+#include "compress/format/file/baked_file.h"
 #include "pbrt_import/scene/material_flag_names.h"
 #include "runtime/frame/view_layers.h"
 #include "runtime/view/layer_previews.h"
 
 namespace packtrace {
 namespace {
+
+/// Adds what the cluster of a surface takes in the file.
+void add_cluster(const BakedFile& file, Pick::Surface& surface) {
+  const auto geometries = file.geometries();
+  const auto next = std::ranges::upper_bound(geometries, uint64_t{surface.cluster}, {},
+                                             [](const auto& geometry) { return uint64_t{geometry.first_cluster}; });
+  if (next == geometries.begin()) return;
+  const auto geometry = static_cast<uint32_t>(next - geometries.begin() - 1);
+  const auto local = static_cast<uint32_t>(surface.cluster - geometries[geometry].first_cluster);
+  if (local >= file.clusters(geometry).size()) return;
+  const ClusterView cluster = file.cluster(geometry, local);
+  surface.cluster_triangles = cluster.triangle_count(), surface.cluster_vertices = cluster.vertex_count();
+  const ClusterView::StreamBits bits = cluster.stream_bits();
+  for (const auto& [name, stream] : {std::pair("indices", bits.indices), std::pair("positions", bits.positions),
+                                     std::pair("normals", bits.normals), std::pair("uvs", bits.uvs)})
+    if (stream > 0) surface.cluster_bytes.emplace_back(name, (stream + 7) / 8);
+  surface.cluster_bytes.emplace_back("record", sizeof(baked::ClusterRecord));
+}
 
 /// The surface at a pixel of the G-buffer.
 Pick::Surface surface_at(const ViewFile& file, const FrameLoop& loop, size_t at) {
@@ -25,6 +45,7 @@ Pick::Surface surface_at(const ViewFile& file, const FrameLoop& loop, size_t at)
   surface.position_error = traced.position_error(surface.geometry);
   const SurfaceDetail detail = traced.detail_of(g.instance[at], g.triangle[at]);
   surface.level = detail.level, surface.cluster = detail.cluster, surface.error_world = detail.error_world;
+  if (loop.scene().file != nullptr) add_cluster(*loop.scene().file, surface);
   if (file.targets)
     if (const auto& instances = file.targets().instances; g.instance[at] < instances.size())
       surface.instance_name = instances[g.instance[at]].name;
@@ -84,6 +105,13 @@ std::vector<std::string> pick_lines(const Pick& p) {
   lines.push_back(
       fmt::format("geometry {}, triangle {}, {} side", s.geometry, s.triangle, s.back_face ? "back" : "front"));
   lines.push_back(fmt::format("level {}, cluster {}, error bound {:.3g}", s.level, s.cluster, s.error_world));
+  if (!s.cluster_bytes.empty()) {
+    lines.push_back(fmt::format("{} triangles, {} vertices in the cluster", s.cluster_triangles, s.cluster_vertices));
+    std::string text;
+    for (const auto& [name, bytes] : s.cluster_bytes)
+      text += fmt::format("{}{} {} B", text.empty() ? "" : ", ", name, bytes);
+    lines.push_back(text);
+  }
   lines.push_back(fmt::format("position error at most {:.3g} per axis", s.position_error));
   return lines;
 }

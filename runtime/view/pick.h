@@ -27,6 +27,9 @@ struct Pick {
     float error_world = 0;    ///< bound of the distance from level 0
     float position_error = 0; ///< bound of |decoded - source| per axis, in object units
     bool back_face = false;
+    // Of its cluster; empty for a scene of floats.
+    uint32_t cluster_triangles = 0, cluster_vertices = 0;
+    std::vector<std::pair<std::string, uint64_t>> cluster_bytes; ///< by stream, each rounded up; then its record
     std::string instance_name, material_name, flags;
   };
   std::optional<Surface> surface;

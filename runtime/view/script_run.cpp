@@ -360,6 +360,11 @@ nlohmann::json pick_json(const Pick& p) {
                      {"cluster", s.cluster},
                      {"error_world", s.error_world},
                      {"position_error", s.position_error}};
+  if (s.cluster_bytes.empty()) return json;
+  nlohmann::json& cluster = json["surface"]["cluster_bytes"];
+  for (const auto& [name, bytes] : s.cluster_bytes) cluster[name] = bytes;
+  json["surface"]["cluster_triangles"] = s.cluster_triangles;
+  json["surface"]["cluster_vertices"] = s.cluster_vertices;
   return json;
 }
 

@@ -182,8 +182,10 @@ FrameConfig ViewSession::frame_config(const PaneState& pane, uint32_t quality) c
   config.size = size_;
   config.lod_layers = config.detail.camera_uses_levels();
   config.ao.radius = ao_radius(config.ao, files_[pane.file].at_rest.source->world_bounds());
+  config.plain_layers = keep_views_ ? uint32_t{kAllPlainLayers} : 0;
   for (size_t i = 0; i < shown_panes(); ++i) {
     const std::vector<std::string> layer{panes_[i].layer};
+    config.plain_layers |= plain_layers_of(panes_[i].image_layer());
     config.view_layers = config.view_layers || keep_views_ || has_view_layer(layer);
     config.surface_layers = config.surface_layers || has_surface_layer(layer);
     config.cost_layers = config.cost_layers || has_cost_layer(layer);
@@ -264,9 +266,16 @@ void ViewSession::resolve() {
   }
 }
 
-const RenderedImage& ViewSession::image(size_t pane) {
+/// The image of a pane with the layers that are shown.
+const RenderedImage& ViewSession::shown_image(size_t pane) {
   resolve();
   return renderers_[renderers_.at(pane) ? pane : 0]->image();
+}
+
+const RenderedImage& ViewSession::image(size_t pane) {
+  const RenderedImage& shown = shown_image(pane);
+  renderers_[renderers_.at(pane) ? pane : 0]->complete();
+  return shown;
 }
 
 const FrameConfig& ViewSession::rendered_config(size_t pane) const {
@@ -277,11 +286,11 @@ const FrameConfig& ViewSession::rendered_config(size_t pane) const {
 Image ViewSession::picture() {
   const auto plain = [&](size_t pane) { return PreviewStyle{std::nullopt, false, panes_[pane].config.display()}; };
   if (split_ == SplitMode::kDifference)
-    return difference_picture(image(0), panes_[0].image_layer(), image(1), panes_[1].image_layer(),
+    return difference_picture(shown_image(0), panes_[0].image_layer(), shown_image(1), panes_[1].image_layer(),
                               static_cast<float>(gain_));
-  Image left = layer_preview(image(0), panes_[0].image_layer(), plain(0));
+  Image left = layer_preview(shown_image(0), panes_[0].image_layer(), plain(0));
   if (split_ == SplitMode::kOff) return left;
-  const Image right = layer_preview(image(1), panes_[1].image_layer(), plain(1));
+  const Image right = layer_preview(shown_image(1), panes_[1].image_layer(), plain(1));
   const auto begin = static_cast<uint32_t>(std::lround(divider_ * left.size.width));
   for (uint32_t y = 0; y < left.size.height; ++y)
     for (uint32_t x = begin; x < left.size.width; ++x) std::ranges::copy(right.pixel(x, y), left.pixel(x, y).begin());
@@ -290,7 +299,7 @@ Image ViewSession::picture() {
 
 DifferenceMetrics ViewSession::metrics() {
   require_view(split_ != SplitMode::kOff, "two views are needed to compare them");
-  return difference_metrics(image(0), panes_[0].image_layer(), image(1), panes_[1].image_layer());
+  return difference_metrics(shown_image(0), panes_[0].image_layer(), shown_image(1), panes_[1].image_layer());
 }
 
 FileContents ViewSession::contents(size_t pane) const {
@@ -300,7 +309,7 @@ FileContents ViewSession::contents(size_t pane) const {
 }
 
 Pick ViewSession::pick(size_t pane, uint32_t x, uint32_t y) {
-  resolve();
+  image(pane);
   const size_t shown = renderers_.at(pane) ? pane : 0;
   require_view(x < size_.width && y < size_.height,
                fmt::format("pixel {}, {} is outside the picture of {} x {} pixels", x, y, size_.width, size_.height));

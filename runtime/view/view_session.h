@@ -86,7 +86,8 @@ public:
   void fix_quality(std::optional<uint32_t> step);
   /// Begins the still picture again with the next frame.
   void restart() { restart_ = true; }
-  /// Whether images have the denoiser's and tracer's views even if no pane shows one.
+  /// Whether images have the denoiser's and tracer's views even if no pane shows one, and all other layers without
+  /// being asked for, as picks of every frame need them.
   void keep_views(bool kept) { keep_views_ = kept; }
 
   // The camera and the scene's time.
@@ -170,6 +171,7 @@ private:
   Camera camera_in(size_t file) const;
   void show_moved();
   void resolve();
+  const RenderedImage& shown_image(size_t pane);
 
   std::vector<ViewFile> files_;
   ViewCamera camera_;

@@ -58,7 +58,8 @@ public:
       if (f % kFramesPerShift == 0) {
         shifted_rays(f / kFramesPerShift, g);
         layers.add(g, input_.source.materials());
-        layers.write_guides(mean);
+        layers.keep(g);
+        layers.write_guides(g, mean);
       }
       sequence.gbuffers.push_back(f == 0 ? guides_of(g) : f % kFramesPerShift == 0 ? guides_of(mean) : GBuffer{});
       sequence.ao.push_back(occlusion(g, f));

@@ -128,6 +128,21 @@ TEST(ViewCommand, TheSameScriptGivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(bytes[0], bytes[1]);
 }
 
+TEST(ViewCommand, PicksTellTheBytesOfTheCluster) {
+  const ViewWorkbench bench;
+  const std::vector<nlohmann::json> results = results_of(bench.view(line(R"({"pick": [32, 30]})")));
+  const nlohmann::json& surface = results.at(0).at("pick").at("surface");
+  uint64_t streams = 0;
+  for (const char* stream : {"indices", "positions"}) {
+    const auto bytes = surface.at("cluster_bytes").at(stream).get<uint64_t>();
+    EXPECT_GT(bytes, 0u) << stream;
+    streams += bytes;
+  }
+  EXPECT_GT(surface.at("cluster_triangles"), 0);
+  EXPECT_GE(surface.at("cluster_vertices"), 3);
+  EXPECT_LE(streams, std::filesystem::file_size(bench.baked()));
+}
+
 TEST(ViewCommand, RecordedPathsCanBePlayed) {
   const ViewWorkbench bench;
   const std::string path = bench / "path.json";

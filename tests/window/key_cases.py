@@ -27,6 +27,19 @@ class Keys(WindowTest):
         self.assertNotIn(viewer.camera(), cameras)
         self.end(viewer)
 
+    def test_movements_are_timed_to_their_pictures(self):
+        viewer = self.open(self.file("room"))
+        for key in "wasd":
+            viewer.hold(key)
+            viewer.moving()
+            viewer.release(key)
+            viewer.still(2)
+        self.end(viewer)
+        latency = viewer.printed("input_to_picture")["input_to_picture"]
+        self.assertGreaterEqual(latency["inputs"], 4)
+        self.assertGreater(latency["median_ms"], 0)
+        self.assertGreaterEqual(latency["p95_ms"], latency["median_ms"])
+
     def test_the_mouse_moves_the_camera(self):
         viewer = self.open(self.file("room"))
         viewer.press("BackSpace")

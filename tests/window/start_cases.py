@@ -65,6 +65,16 @@ class Start(WindowTest):
             self.assertEqual(done.returncode, 3, done.stderr)
             self.assertIn(name, done.stderr)
 
+    def test_it_needs_no_float_textures(self):
+        self.display.environment["MESA_EXTENSION_OVERRIDE"] = " ".join(
+            "-GL_" + name for name in ("ARB_texture_float", "ARB_half_float_pixel", "EXT_packed_float", "ARB_color_buffer_float", "OES_texture_float"))
+        self.addCleanup(self.display.environment.pop, "MESA_EXTENSION_OVERRIDE")
+        viewer = self.open(self.file("room"))
+        viewer.press("BackSpace")
+        viewer.still(4)
+        self.assertGreater(len(set(struct.iter_unpack("3B", self.screen(viewer)))), 20)
+        self.end(viewer)
+
     def test_without_a_display_it_says_what_to_do(self):
         environment = {name: value for name, value in self.display.environment.items() if name != "DISPLAY"}
         old_opengl = dict(self.display.environment, MESA_GL_VERSION_OVERRIDE="2.1")

@@ -93,6 +93,7 @@ class Views(WindowTest):
                     self.assertAlmostEqual(got, expected, delta=tolerance * max(1.0, abs(expected)), msg=name)
             self.assertIn("position", pick["surface"])
             self.assertNotEqual(pick["surface"]["material_name"], "")
+            self.assertGreater(pick["surface"]["cluster_bytes"]["positions"], 0)
         self.end(viewer)
 
     def test_a_double_click_sets_the_pivot(self):

@@ -270,6 +270,9 @@ void Panels::draw_times(const ViewSnapshot& snapshot) const {
     for (const auto& [name, member] : kPasses)
       if (const double s = snapshot.frame.report.times.*member; s > 0.0)
         text_line(fmt::format("{:<9}{:7.1f} ms", name, 1e3 * s));
+    if (latency.count() > 0)
+      text_line(fmt::format("input to picture {:.0f} ms, 95 % below {:.0f} ms", latency.percentile_ms(0.5),
+                            latency.percentile_ms(0.95)));
     const PictureReport& r = snapshot.frame.report;
     text_line(fmt::format("{:.2f} M camera, {:.2f} M occlusion rays", 1e-6 * static_cast<double>(r.primary_rays),
                           1e-6 * static_cast<double>(r.ao_rays)));

@@ -22,6 +22,7 @@ void draw_gizmo(const Gizmo& gizmo, std::optional<size_t> held);
 class Panels {
 public:
   bool shown = true, help = false;
+  InputLatency latency;
   bool any() const { return shown || help; }
 
   /// Adds the times of a new frame.

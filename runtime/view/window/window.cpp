@@ -108,6 +108,7 @@ struct ViewerWindow::State {
     double x = 0, y = 0, time_s = 0;
   };
   std::vector<InputEvent> input;
+  std::optional<double> unseen_input_s; ///< ViewSnapshot::input_s of a picture that is not on the screen yet
   std::optional<MouseButton> dragged;
   bool moves_divider = false;
   std::optional<size_t> moved_axis; ///< of the gizmo
@@ -312,6 +313,7 @@ void ViewerWindow::State::take_snapshot() {
   shown = latest;
   texture.upload(*shown);
   panels.add_frame(*shown);
+  if (shown->input_s) unseen_input_s = shown->input_s;
   const ViewFrame& f = shown->frame;
   std::string text =
       fmt::format("{} - packtrace - {:.0f} fps, {:.1f} ms - {} - {} x {}, {} spp - {}",
@@ -348,6 +350,8 @@ void ViewerWindow::State::draw() {
   glClear(GL_COLOR_BUFFER_BIT);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glfwSwapBuffers(window);
+  if (unseen_input_s) panels.latency.add(1e3 * (input_clock_s() - *unseen_input_s));
+  unseen_input_s.reset();
 }
 
 namespace {
@@ -416,6 +420,8 @@ ViewerWindow::~ViewerWindow() {
   glfwDestroyWindow(state_->window);
   glfwTerminate();
 }
+
+const InputLatency& ViewerWindow::latency() const { return state_->panels.latency; }
 
 void ViewerWindow::run(FrameThread& frames, const WindowActions& actions) {
   state_->frames = &frames;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "runtime/view/frame_thread.h"
+#include "runtime/view/input_latency.h"
 
 namespace packtrace {
 
@@ -28,6 +29,9 @@ public:
 
   /// Shows frames until the window is closed. Rethrows what ended the frame thread.
   void run(FrameThread& frames, const WindowActions& actions);
+
+  /// The times from movements to their pictures on the screen.
+  const InputLatency& latency() const;
 
   struct State; ///< of window.cpp
 

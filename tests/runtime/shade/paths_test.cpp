@@ -213,6 +213,33 @@ TEST(PathTracer, AgreesWithBruteForce) {
   EXPECT_LT(difference / total, 0.1); // noise of 16,384 directions
 }
 
+TEST(PathTracer, LightPassesWhatIsPartlyOpaque) {
+  SurfaceShading half; // an uber material of opacity 0.25, 0.5, 1
+  half.bits = kThin, half.transmission = Vec3(0.75f, 0.5f, 0.0f);
+  Light sun;
+  sun.kind = LightKind::kDistant, sun.direction = Vec3(0, 1, 0), sun.radiance = Vec3(2.0f);
+  const Camera camera = test::floor_camera();
+  const auto lit = [&](uint32_t veils, bool wall) {
+    Scene scene;
+    test::add_shaded(scene, test::floor_quad(4.0f), {}, Vec3(0.5f));
+    for (uint32_t i = 0; i < veils; ++i) {
+      const uint32_t veil =
+          test::add_shape(scene, test::quad(Vec3(-1, 1.0f + static_cast<float>(i), -1), Vec3(2, 0, 0), Vec3(0, 0, 2)));
+      scene.materials[scene.shapes[veil].material].shading = half;
+    }
+    if (wall) test::add_shaded(scene, test::quad(Vec3(-1, 5, -1), Vec3(2, 0, 0), Vec3(0, 0, 2)), {});
+    scene.lights.push_back(sun);
+    return test::middle(scene, camera, no_ambient());
+  };
+  const Vec3 open = lit(0, false), once = lit(1, false), twice = lit(2, false);
+  EXPECT_GT(open.x, 0.1f);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(once[c], open[c] * half.transmission[c], 1e-5f) << c;
+    EXPECT_NEAR(twice[c], open[c] * half.transmission[c] * half.transmission[c], 1e-5f) << c;
+  }
+  EXPECT_EQ(lit(1, true), Vec3(0.0f)) << "a wall above it";
+}
+
 TEST(PathTracer, DoesNotDependOnThreads) {
   Scene scene = striped_scene(test::specular_surface(kFresnelDielectric, 0.3f));
   test::add_shaded(scene, test::sphere(Vec3(0, 1, 0), 1.0f, 16), {});

@@ -195,6 +195,22 @@ TEST(ViewSession, PicksAreTheValuesOfTheImage) {
   EXPECT_THROW(session.pick(0, 48, 0), Error);
 }
 
+TEST(ViewSession, LayersThatNoOneLooksAtAreMadeWhenSomeoneDoes) {
+  const ViewBench bench;
+  ViewSession plain = bench.session(), asked = bench.session();
+  plain.keep_views(true);
+  for (int i = 0; i < 3; ++i) {
+    for (ViewSession* session : {&plain, &asked}) {
+      session->move_camera([](ViewCamera& camera) { camera.move({0.1, 0, 0}); });
+      test::step(*session, 1);
+    }
+    EXPECT_EQ(asked.picture().data, plain.picture().data);
+    EXPECT_EQ(asked.pick(0, 24, 16).normal, plain.pick(0, 24, 16).normal);
+    EXPECT_EQ(asked.image(0).shaded, plain.image(0).shaded);
+    EXPECT_EQ(asked.image(0).instance, plain.image(0).instance);
+  }
+}
+
 TEST(ViewSession, SettlingRendersWhatChanged) {
   const ViewBench bench;
   ViewSession session = bench.session();
