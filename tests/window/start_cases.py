@@ -65,9 +65,9 @@ class Start(WindowTest):
             self.assertEqual(done.returncode, 3, done.stderr)
             self.assertIn(name, done.stderr)
 
-    def test_it_needs_no_float_textures(self):
-        self.display.environment["MESA_EXTENSION_OVERRIDE"] = " ".join(
-            "-GL_" + name for name in ("ARB_texture_float", "ARB_half_float_pixel", "EXT_packed_float", "ARB_color_buffer_float", "OES_texture_float"))
+    def test_it_needs_no_float_pixels(self):
+        # Without ARB_texture_float Mesa offers no OpenGL 3.3 and crashes when it is asked for.
+        self.display.environment["MESA_EXTENSION_OVERRIDE"] = "-GL_ARB_half_float_pixel -GL_ARB_color_buffer_float"
         self.addCleanup(self.display.environment.pop, "MESA_EXTENSION_OVERRIDE")
         viewer = self.open(self.file("room"))
         viewer.press("BackSpace")
