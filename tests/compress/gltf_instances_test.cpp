@@ -44,6 +44,26 @@ TEST(GltfInstances, ShearAndFlatMapsStayMatrices) {
   EXPECT_FALSE(decompose_instance(turned(0.5, {1, 0, 1}, {})));
 }
 
+TEST(GltfInstances, RoundedValuesMoveNoCornerByMoreThanAStep) {
+  const Bounds stored{DVec3(-300.0), DVec3(500.0)};
+  for (const double smallest : {1.0, 1e-12}) { // the second needs floats: one exponent does not suit both sizes
+    std::vector<DAffine> maps;
+    for (int i = 0; i < 20; ++i)
+      maps.push_back(turned(0.3 * i, DVec3(i == 7 ? smallest : 1.0 + 0.1 * i), {71.3 * i, -5.0, 0.01 * i}));
+    GltfModel model;
+    MeshoptStreams streams(model);
+    GltfJson attributes;
+    const double moved = InstanceAttributes(maps).add_coded(stored, streams, attributes);
+    EXPECT_LE(moved, smallest == 1.0 ? 1.0 : 1e-3);
+    EXPECT_EQ(attributes.size(), 3u);
+    streams.finish();
+    size_t without_filter = 0;
+    for (const GltfJson& view : model.json()["bufferViews"])
+      without_filter += !view["extensions"]["EXT_meshopt_compression"].contains("filter");
+    EXPECT_EQ(without_filter > 0, smallest != 1.0);
+  }
+}
+
 TEST(GltfInstances, ThoseOfAMeshShareANode) {
   Scene scene = test::scene_of(test::sphere_mesh(12));
   scene.shapes.clear();

@@ -24,7 +24,10 @@ public:
     count_instances();
     decode();
     if (config_.codec == GltfCodec::kDraco) compress();
-    if (config_.codec == GltfCodec::kMeshopt) choose_uv_grid();
+    if (config_.codec == GltfCodec::kMeshopt) {
+      drop_whole_tiles();
+      choose_uv_grid();
+    }
     progress_.begin("assembling the file", 0);
     model_.scene_nodes().push_back(model_.add("nodes", GltfJson::object())); // the root, which GltfNodes fills
     materials_.add_all(uvs_.map());
@@ -98,6 +101,38 @@ private:
       }
       progress_.advance();
     });
+  }
+
+  /// Whether an image looks the same after a shift of texture coordinates.
+  template <class View>
+  static bool repeats(const View& view, glm::dvec2 shift) {
+    const glm::dvec2 texels = glm::dvec2(view.uv_scale) * shift;
+    return view.wrap == WrapMode::kRepeat && texels == glm::floor(texels);
+  }
+
+  bool repeats(uint32_t material, glm::dvec2 shift) const {
+    const baked::MaterialRecord& record = file_.sections().materials[material];
+    return (record.alpha_mask == baked::kNone || repeats(file_.mask(record.alpha_mask), shift)) &&
+           (record.albedo_texture == baked::kNone || repeats(file_.texture(record.albedo_texture), shift));
+  }
+
+  /// Shifts the texture coordinates of each primitive to near 0 where its images repeat, so that fewer bits suffice.
+  void drop_whole_tiles() {
+    std::vector<std::vector<uint32_t>> users(file_.geometries().size());
+    for (uint32_t i = 0; i < file_.instances().size(); ++i) users[file_.instances()[i].geometry].push_back(i);
+    for (uint32_t g = 0; g < file_.base_geometry_count(); ++g) // levels of detail keep theirs
+      for (EncodedPrimitive& primitive : encoded_[g].primitives) {
+        std::vector<Vec2>& uvs = primitive.plain.uvs;
+        if (!encoded_[g].with_uvs || uvs.empty()) continue;
+        glm::dvec2 lo(uvs.front());
+        for (const Vec2& uv : uvs) lo = glm::min(lo, glm::dvec2(uv));
+        const glm::dvec2 shift = glm::floor(lo);
+        const bool same = std::ranges::all_of(users[g], [&](uint32_t i) {
+          return repeats(file_.instance_materials(i)[primitive.plain.material_slot], shift);
+        });
+        if (same)
+          for (Vec2& uv : uvs) uv = Vec2(glm::dvec2(uv) - shift);
+      }
   }
 
   /// Chooses a grid for all texture coordinates: errors stay below an eighth of a texel of the largest texture. Floats

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <string>
 
 #include <glm/gtc/quaternion.hpp>
 #include <meshoptimizer.h>
@@ -42,6 +44,16 @@ std::vector<std::byte> round_vectors(std::vector<InstanceTransform>& transforms,
       value = static_cast<float>(std::ldexp(static_cast<double>(mantissas.back()), exponent));
     }
   return exponential(mantissas, exponent);
+}
+
+template <class Member>
+std::vector<std::byte> raw_values(const std::vector<InstanceTransform>& transforms, Member member) {
+  std::vector<std::byte> bytes;
+  for (const InstanceTransform& t : transforms) {
+    const auto raw = std::as_bytes(std::span(t.*member));
+    bytes.insert(bytes.end(), raw.begin(), raw.end());
+  }
+  return bytes;
 }
 
 /// Rounds rotations to quaternions of 16-bit integers; returns what the filter QUATERNION stores.
@@ -134,17 +146,17 @@ double InstanceAttributes::displacement(const std::vector<InstanceTransform>& ro
   return largest;
 }
 
-/// Adds rotations with the fewest bits that move no corner by more than the tolerance, or else floats of 24 bits.
-void InstanceAttributes::add_rotations(const Bounds& stored, double tolerance, std::vector<InstanceTransform>& rounded,
-                                       MeshoptStreams& streams, GltfJson& attributes) const {
-  GltfJson accessor{{"type", "VEC4"}, {"componentType", kGltfShort}, {"normalized", true}};
+/// Rounds rotations to the fewest bits that move no corner by more than the tolerance, or else to floats of 24 bits.
+InstanceAttributes::Coded InstanceAttributes::code_rotations(const Bounds& stored, double tolerance,
+                                                             std::vector<InstanceTransform>& rounded) const {
   for (const int bits : {10, 12, 14, 16}) {
     std::vector<InstanceTransform> turned = transforms_;
-    const std::vector<std::byte> codes = round_rotations(turned, bits);
+    std::vector<std::byte> codes = round_rotations(turned, bits);
     if (displacement(turned, stored) > tolerance) continue;
     for (size_t i = 0; i < turned.size(); ++i) rounded[i].rotation = turned[i].rotation;
-    attributes["ROTATION"] = streams.add({8, 0, "QUATERNION"}, codes, std::move(accessor));
-    return;
+    return {{8, 0, "QUATERNION"},
+            std::move(codes),
+            {{"type", "VEC4"}, {"componentType", kGltfShort}, {"normalized", true}}};
   }
   constexpr int kExponent = -22;
   std::vector<int64_t> mantissas;
@@ -153,8 +165,7 @@ void InstanceAttributes::add_rotations(const Bounds& stored, double tolerance, s
       mantissas.push_back(std::llrint(std::ldexp(double{value}, -kExponent)));
       value = static_cast<float>(std::ldexp(static_cast<double>(mantissas.back()), kExponent));
     }
-  attributes["ROTATION"] = streams.add({16, 0, "EXPONENTIAL"}, exponential(mantissas, kExponent),
-                                       {{"type", "VEC4"}, {"componentType", kGltfFloat}});
+  return {{16, 0, "EXPONENTIAL"}, exponential(mantissas, kExponent), {{"type", "VEC4"}, {"componentType", kGltfFloat}}};
 }
 
 double InstanceAttributes::add_coded(const Bounds& stored, MeshoptStreams& streams, GltfJson& attributes) {
@@ -166,15 +177,31 @@ double InstanceAttributes::add_coded(const Bounds& stored, MeshoptStreams& strea
   const double tolerance = 0.25 * unit; // of a stored unit, in world units
   std::vector<InstanceTransform> rounded = transforms_;
   const GltfJson vectors{{"type", "VEC3"}, {"componentType", kGltfFloat}};
+  std::map<std::string, Coded> coded;
+  coded["TRANSLATION"] = {
+      {12, 0, "EXPONENTIAL"}, round_vectors(rounded, &InstanceTransform::translation, tolerance), vectors};
+  coded["ROTATION"] = code_rotations(stored, tolerance, rounded);
+  coded["SCALE"] = {
+      {12, 0, "EXPONENTIAL"}, round_vectors(rounded, &InstanceTransform::scale, tolerance / radius), vectors};
+  // Sizes and distances that no common exponent suits stay floats.
+  constexpr double kMaxUnits = 2.0;
+  double moved = displacement(rounded, stored);
+  if (!(moved <= kMaxUnits * unit)) {
+    rounded = transforms_;
+    moved = displacement(rounded, stored);
+    coded["TRANSLATION"] = {{12, 0, {}}, raw_values(rounded, &InstanceTransform::translation), vectors};
+    coded["ROTATION"] = {{16, 0, {}},
+                         raw_values(rounded, &InstanceTransform::rotation),
+                         {{"type", "VEC4"}, {"componentType", kGltfFloat}}};
+    coded["SCALE"] = {{12, 0, {}}, raw_values(rounded, &InstanceTransform::scale), vectors};
+  }
   const InstanceTransform identity;
-  attributes["TRANSLATION"] =
-      streams.add({12, 0, "EXPONENTIAL"}, round_vectors(rounded, &InstanceTransform::translation, tolerance), vectors);
-  if (!std::ranges::all_of(transforms_, [&](const auto& t) { return t.rotation == identity.rotation; }))
-    add_rotations(stored, tolerance, rounded, streams, attributes);
-  if (!std::ranges::all_of(transforms_, [&](const auto& t) { return t.scale == identity.scale; }))
-    attributes["SCALE"] = streams.add({12, 0, "EXPONENTIAL"},
-                                      round_vectors(rounded, &InstanceTransform::scale, tolerance / radius), vectors);
-  return displacement(rounded, stored);
+  if (std::ranges::all_of(transforms_, [&](const auto& t) { return t.rotation == identity.rotation; }))
+    coded.erase("ROTATION");
+  if (std::ranges::all_of(transforms_, [&](const auto& t) { return t.scale == identity.scale; })) coded.erase("SCALE");
+  for (auto& [name, values] : coded)
+    attributes[name] = streams.add(values.format, values.bytes, std::move(values.accessor));
+  return moved;
 }
 
 } // namespace packtrace

@@ -30,7 +30,8 @@ public:
   /// Adds floats to the attributes; returns their bytes.
   uint64_t add_floats(GltfModel& model, GltfJson& attributes) const;
 
-  /// Adds values that are rounded so that no point of the mesh moves by more than about half a stored unit, and returns
+  /// Adds values that are rounded so that no point of the mesh moves by more than about half a stored unit, or floats
+  /// where sizes or distances differ too much for that, and returns
   /// the largest distance that a corner of the box moves, in world units. Changes the order of the instances.
   /// @param stored bounds of the mesh, in units of the lattice's step
   double add_coded(const Bounds& stored, MeshoptStreams& streams, GltfJson& attributes);
@@ -38,8 +39,13 @@ public:
 private:
   void sort();
   double displacement(const std::vector<InstanceTransform>& rounded, const Bounds& stored) const;
-  void add_rotations(const Bounds& stored, double tolerance, std::vector<InstanceTransform>& rounded,
-                     MeshoptStreams& streams, GltfJson& attributes) const;
+  /// An attribute as a stream stores it.
+  struct Coded {
+    MeshoptStreams::Format format;
+    std::vector<std::byte> bytes;
+    GltfJson accessor;
+  };
+  Coded code_rotations(const Bounds& stored, double tolerance, std::vector<InstanceTransform>& rounded) const;
 
   std::vector<DAffine> maps_;
   std::vector<InstanceTransform> transforms_;

@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <limits>
+#include <string>
 
 #include <meshoptimizer.h>
 
@@ -50,8 +51,9 @@ uint64_t MeshoptStreams::finish() {
                              ? meshopt_encodeIndexBuffer(to, coded.size(), stream.indices.data(), count)
                              : meshopt_encodeVertexBuffer(to, coded.size(), stream.bytes.data(), count, format.stride);
     coded.resize(bytes);
-    model_.fill_compressed_view(stream.view, coded, format.target,
-                                {is_indices ? "TRIANGLES" : "ATTRIBUTES", format.filter, format.stride, count});
+    model_.fill_compressed_view(
+        stream.view, coded, format.target,
+        {is_indices ? "TRIANGLES" : "ATTRIBUTES", std::string(format.filter), format.stride, count});
     total += bytes;
     stream = {};
   }

@@ -5,7 +5,7 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
@@ -20,9 +20,9 @@ public:
   explicit MeshoptStreams(GltfModel& model) : model_(model) {}
 
   struct Format {
-    uint32_t stride = 0; ///< bytes of an element: a multiple of 4, or 2 and 4 for indices
-    int target = 0;      ///< kGltfVertices, kGltfIndices or 0
-    std::string filter;  ///< that decoders apply; empty: none
+    uint32_t stride = 0;     ///< bytes of an element: a multiple of 4, or 2 and 4 for indices
+    int target = 0;          ///< kGltfVertices, kGltfIndices or 0
+    std::string_view filter; ///< that decoders apply, a literal; empty: none
     bool operator<(const Format& other) const {
       return std::tie(stride, target, filter) < std::tie(other.stride, other.target, other.filter);
     }
