@@ -38,6 +38,8 @@ struct MeasureOptions {
   std::optional<std::string> camera;
   double max_error = 0.005;
   std::string denoiser = "ours";
+  std::string backend = "packed";
+  std::optional<std::string> gpu_device;
   SceneOptions scene;
 
   MatrixMode mode() const { return quick ? MatrixMode::kQuick : full ? MatrixMode::kFull : MatrixMode::kDefault; }
@@ -123,6 +125,16 @@ Words common_words(const GlobalOptions& globals) {
   return words;
 }
 
+/// Options of render for the tracer of packed files.
+Words tracer_words(const MeasureOptions& options) {
+  if (options.gpu_device && options.backend != "gpu")
+    throw Error(ErrorKind::kUsage, "--gpu-device requires --backend gpu");
+  Words words;
+  if (options.backend != MeasureOptions().backend) words.insert(words.end(), {"--backend", options.backend});
+  if (options.gpu_device) words.insert(words.end(), {"--gpu-device", *options.gpu_device});
+  return words;
+}
+
 std::string command_text(const MeasureOptions& options) {
   Words words{"packtrace", "measure", options.input, "-o", options.output};
   if (options.quick) words.emplace_back("--quick");
@@ -131,6 +143,7 @@ std::string command_text(const MeasureOptions& options) {
   if (options.width) words.insert(words.end(), {"--width", std::to_string(*options.width)});
   if (options.camera) words.insert(words.end(), {"--camera", *options.camera});
   if (options.denoiser != MeasureOptions().denoiser) words.insert(words.end(), {"--denoiser", options.denoiser});
+  for (const std::string& word : tracer_words(options)) words.push_back(word);
   for (const std::string& word : scene_words(options.scene)) words.push_back(word);
   return shell_command(words);
 }
@@ -162,6 +175,7 @@ MeasureConfig config_of(const MeasureOptions& options, const GlobalOptions& glob
   runner.distance_samples = std::array<uint64_t, 3>{50'000, kDefaultDistanceSamples, 1'000'000}[mode];
   runner.diagonal = config.matrix_scene.diagonal;
   runner.denoiser = options.denoiser;
+  runner.tracer = tracer_words(options);
   return config;
 }
 
@@ -253,6 +267,12 @@ void add_measure_command(CLI::App& app, GlobalOptions& globals, const std::strin
   verb.add_option("--denoiser", options->denoiser,
                   "Denoiser of the points that are denoised, as of render: ours or reference (default ours)")
       ->check(one_of({"ours", "reference"}))
+      ->type_name("NAME");
+  verb.add_option("--backend", options->backend,
+                  "Ray tracer of the packed files' pictures: packed, or gpu with the same hits (default packed)")
+      ->check(one_of({"packed", "gpu"}));
+  verb.add_option("--gpu-device", options->gpu_device,
+                  "Part of the name of the Vulkan device to use, as of render; requires --backend gpu")
       ->type_name("NAME");
   verb.add_option(
           "--max-error", options->max_error,

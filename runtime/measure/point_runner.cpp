@@ -94,7 +94,8 @@ PointRunner::~PointRunner() {
 
 Words render_words(const RenderKnobs& knobs, const RunnerConfig& config) {
   const bool other = knobs.denoise && config.denoiser != RunnerConfig().denoiser;
-  return words_of(knobs) + (other ? Words{"--denoiser", config.denoiser} : Words{});
+  return words_of(knobs) + (other ? Words{"--denoiser", config.denoiser} : Words{}) +
+         (knobs.backend == RenderKnobs().backend ? config.tracer : Words{});
 }
 
 std::string PointRunner::key(const MeasurePoint& point) const {

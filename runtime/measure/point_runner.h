@@ -31,9 +31,10 @@ struct RunnerConfig {
   bool embree_beside_each_point = true;
   double diagonal = 0.0;         ///< of the scene, world units
   std::string denoiser = "ours"; ///< --denoiser of points that are denoised
+  Words tracer;                  ///< options of render for points that packed traces: --backend, --gpu-device
 };
 
-/// Options of render for the knobs, with the denoiser if they use one.
+/// Options of render for the knobs, with the denoiser if they use one, and the tracer in place of packed.
 Words render_words(const RenderKnobs& knobs, const RunnerConfig& config);
 
 /// A stage of a point that did not succeed.

@@ -1,5 +1,6 @@
 // The parts of a measurement: matrix, fronts, histograms, image errors, folders and child processes.
 
+#include <algorithm>
 #include <csignal>
 #include <set>
 
@@ -15,6 +16,7 @@
 #include "runtime/measure/measure_folder.h"
 #include "runtime/measure/pareto.h"
 #include "runtime/measure/pictures.h"
+#include "runtime/measure/point_runner.h"
 #include "runtime/measure/report.h"
 #include "tests/temporary_folder.h"
 
@@ -23,6 +25,20 @@ namespace {
 
 using Json = nlohmann::json;
 constexpr std::array kModes{MatrixMode::kQuick, MatrixMode::kDefault, MatrixMode::kFull};
+
+TEST(RenderWords, OtherTracersTakeTheOptionsOfPackedOnly) {
+  RunnerConfig config;
+  RenderKnobs knobs;
+  const Words packed = render_words(knobs, config);
+  config.tracer = {"--backend", "gpu", "--gpu-device", "llvm"};
+  Words expected = packed;
+  expected.insert(expected.end(), config.tracer.begin(), config.tracer.end());
+  EXPECT_EQ(render_words(knobs, config), expected);
+  knobs.backend = "embree";
+  const Words embree = render_words(knobs, config);
+  EXPECT_EQ(std::ranges::count(embree, "--gpu-device"), 0);
+  EXPECT_EQ(std::ranges::count(embree, "--backend"), 1);
+}
 
 TEST(Matrix, PointsAreDistinctAndStartWithTheDefault) {
   size_t smaller = 0;
