@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "compress/bake/lod/bound/triangle_refiner.h"
+
 namespace packtrace::test {
 namespace {
 
@@ -116,6 +118,25 @@ TEST(DirectBound, HistoryForgetsWhatIsTooFarBack) {
   const auto first = history.below(12), second = history.below(13);
   EXPECT_EQ(std::vector<uint32_t>(first.begin(), first.end()), (std::vector<uint32_t>{1, 2}));
   EXPECT_EQ(std::vector<uint32_t>(second.begin(), second.end()), (std::vector<uint32_t>{7}));
+}
+
+/// Where one triangle lies over many of a flat surface, the distance of its parts from single triangles is large.
+TEST(TriangleRefiner, FlatPartsHaveNoTangentialDistance) {
+  constexpr uint32_t kCells = 4;
+  const auto point = [](uint32_t x, uint32_t y) { return DVec3(x, y, 0.0); };
+  TriangleRefiner refiner;
+  TriangleSet& among = refiner.begin();
+  for (uint32_t y = 0; y < kCells; ++y)
+    for (uint32_t x = 0; x < kCells; ++x) {
+      among.add({point(x, y), point(x + 1, y), point(x + 1, y + 1)}, 2 * (kCells * y + x));
+      among.add({point(x, y), point(x + 1, y + 1), point(x, y + 1)}, 2 * (kCells * y + x) + 1);
+    }
+  refiner.measure_corners({DVec3(0.2, 0.1, 0.0), DVec3(3.9, 0.7, 0.0), DVec3(1.3, 3.6, 0.0)});
+  double noted = 0.0;
+  const double bound = refiner.run([&](double distance, uint32_t) { return distance <= 1e-9; },
+                                   [&](uint32_t, double distance) { noted = std::max(noted, distance); });
+  EXPECT_LE(bound, 1e-9);
+  EXPECT_EQ(bound, noted);
 }
 
 } // namespace

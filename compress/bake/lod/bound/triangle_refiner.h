@@ -5,15 +5,18 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "compress/bake/lod/bound/surface_side.h"
 #include "compress/bake/lod/bound/triangle_set.h"
+#include "compress/bake/lod/bound/triangle_subtraction.h"
 
 namespace packtrace {
 
 /// Bounds the distance of a triangle from the nearest of several triangles. Distance from a triangle is convex, so its
-/// maximum is at a corner; the triangle is subdivided into four while that lowers the bound considerably.
+/// maximum is at a corner. Parts over one triangle are measured there; where that is not enough for all of it, the
+/// triangle is subdivided into four while that lowers the bound considerably.
 class TriangleRefiner {
 public:
   /// Empties the set of triangles to measure against and returns it, for the caller to fill.
@@ -54,7 +57,11 @@ public:
 
 private:
   static constexpr size_t kMaxCuts = 5;
-  static constexpr double kGoodEnough = 1.1; // stops within this factor of the lower bound
+  static constexpr size_t kSubtractedCuts = 2; // parts that were cut more often are not subtracted from
+  // Subtracts only where the bound is this many times the lower bound: mostly tangential distance.
+  static constexpr double kLeak = 8.0;
+  static constexpr size_t kMaxSubtracted = 48; // triangles
+  static constexpr double kGoodEnough = 1.1;   // stops within this factor of the lower bound
 
   /// One subdivision level: the corners of a part and the midpoints of its sides, with their distances.
   struct Level {
@@ -90,9 +97,49 @@ private:
       noted(number, nearest.distance);
       return;
     }
+    if (depth <= kSubtractedCuts && nearest.distance > kLeak * nearest.least &&
+        covers(depth, corners, good, enough, noted))
+      return;
     divide(depth, corners, nearest.place, good, enough);
     for (const std::array<size_t, 3>& part : {std::array<size_t, 3>{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
       cut(depth + 1, part, enough, noted);
+  }
+
+  /// Bounds a part of the triangle by those of the set that are near enough, each for what lies over it. Calls noted()
+  /// and returns true if nothing is left but what is near enough to one of them.
+  template <typename Enough, typename Noted>
+  bool covers(size_t depth, const std::array<size_t, 3>& corners, double good, const Enough& enough,
+              const Noted& noted) {
+    const Level& level = levels_[depth];
+    const TriangleSet& among = *level.among;
+    if (among.size() > kMaxSubtracted) return false;
+    subtraction_.begin({level.points[corners[0]], level.points[corners[1]], level.points[corners[2]]});
+    taken_.clear();
+    work_ += among.size();
+    for (uint32_t i = 0; i < among.size() && !subtraction_.rest().empty(); ++i) {
+      const uint32_t number = among.number(i);
+      subtraction_.subtract(
+          among.corners(i), [&](double distance) { return distance <= good || enough(distance, number); },
+          [&](double distance) { taken_.emplace_back(number, distance); });
+      if (subtraction_.rest().size() > TriangleSubtraction::kMaxRest) return false;
+    }
+    if (taken_.empty()) return false;
+    for (const TriangleSubtraction::Polygon& rest : subtraction_.rest()) {
+      uint32_t i = 0;
+      double distance = 0.0;
+      work_ += among.size();
+      for (; i < among.size(); ++i) {
+        distance = TriangleSubtraction::distance(rest, among.corners(i));
+        if (distance <= good || enough(distance, among.number(i))) break;
+      }
+      if (i == among.size()) return false;
+      taken_.emplace_back(among.number(i), distance);
+    }
+    for (const auto& [number, distance] : taken_) {
+      largest_ = std::max(largest_, distance);
+      noted(number, distance);
+    }
+    return true;
   }
 
   /// Sets up the next level. Triangles that are too far away cannot be nearest for any part; they are dropped from the
@@ -133,6 +180,8 @@ private:
 
   std::array<Level, kMaxCuts + 1> levels_;
   std::vector<uint32_t> near_;
+  TriangleSubtraction subtraction_;
+  std::vector<std::pair<uint32_t, double>> taken_; ///< triangle numbers with distances
   double largest_ = 0.0;
   size_t work_ = 0;
 };

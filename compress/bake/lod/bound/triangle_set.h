@@ -26,6 +26,15 @@ public:
   bool empty() const { return numbers_.empty(); }
   uint32_t number(size_t i) const { return numbers_[i]; }
 
+  std::array<DVec3, 3> corners(size_t i) const {
+    const TriangleBlock& block = blocks_[i / 4];
+    const auto vector = [&](const double(&from)[3][4]) {
+      return DVec3(from[0][i % 4], from[1][i % 4], from[2][i % 4]);
+    };
+    const DVec3 a = vector(block.a);
+    return {a, a + vector(block.ab), a + vector(block.ac)};
+  }
+
   /// Distances of points from all triangles. Writes one row of padded_size() entries per point; entries from size() on
   /// are padding with very large distances.
   void distances(std::span<const DVec3> points, std::span<double* const> rows) const;
