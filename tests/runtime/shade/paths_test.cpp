@@ -1,6 +1,9 @@
 // Reflections and transmissions against analytic directions, and pictures against brute force.
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -195,6 +198,7 @@ TEST(PathTracer, AgreesWithBruteForce) {
   BruteForce brute(scene, bench);
   const HitSurfaces surfaces(bench.source, bench.tracer);
   double difference = 0.0, total = 0.0;
+  std::vector<double> errors; // by pixel
   DVec3 ours(0.0), theirs(0.0);
   for (uint32_t y = 0; y < size.height; ++y)
     for (uint32_t x = 0; x < size.width; ++x) {
@@ -207,10 +211,19 @@ TEST(PathTracer, AgreesWithBruteForce) {
       const DVec3 exact = brute.reflected_light(point, -direction, 1, 16384);
       const DVec3 found(frame.direct[p] + frame.specular[p]);
       difference += glm::length(found - exact), total += glm::length(exact);
+      errors.push_back(glm::length(found - exact) / glm::length(exact));
       ours += found, theirs += exact;
     }
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(ours[c] / theirs[c], 1.0, 0.01) << c;
   EXPECT_LT(difference / total, 0.1); // noise of 16,384 directions
+  ASSERT_GT(errors.size(), 60u);
+  std::ranges::sort(errors);
+  const double median = errors[errors.size() / 2], p95 = errors[errors.size() * 95 / 100];
+  RecordProperty("median_pixel_error", std::to_string(median));
+  RecordProperty("p95_pixel_error", std::to_string(p95));
+  RecordProperty("largest_pixel_error", std::to_string(errors.back()));
+  EXPECT_LT(median, 0.04);
+  EXPECT_LT(p95, 0.1);
 }
 
 TEST(PathTracer, LightPassesWhatIsPartlyOpaque) {
