@@ -18,6 +18,7 @@
 #include "compress/exchange/vertex16/vertex16_export.h"
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/base/output_file.h"
+#include "pbrt_import/base/printable.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/export_reports.h"
@@ -82,6 +83,11 @@ std::string layout_of(const ExportOptions& options) {
   return asked;
 }
 
+/// Name of the output without its ending, for names of the files beside it: in JSON they must be UTF-8.
+std::string stem_of(const ExportOptions& options) {
+  return to_utf8(std::filesystem::path(options.output).stem().string());
+}
+
 /// The profile's settings with those that options replace.
 GltfConfig gltf_config(const ExportOptions& options) {
   GltfConfig config = gltf_profile(options.profile == kPortable ? GltfProfile::kPortable
@@ -97,8 +103,7 @@ GltfConfig gltf_config(const ExportOptions& options) {
   if (options.webp_psnr) config.webp_psnr = *options.webp_psnr;
   config.instancing |= options.instancing;
   config.levels |= options.levels;
-  if (ending_of(options.output) == ".gltf")
-    config.buffer_name = std::filesystem::path(options.output).filename().replace_extension(".bin").string();
+  if (ending_of(options.output) == ".gltf") config.buffer_name = stem_of(options) + ".bin";
   return config;
 }
 
@@ -124,7 +129,7 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
   }
   if (layout != kVertex16) {
     names.layout = layout;
-    const std::string stem = std::filesystem::path(options.output).stem().string();
+    const std::string stem = stem_of(options);
     SceneExport result = layout == kPbrt  ? export_pbrt(file, stem, progress)
                          : layout == kObj ? export_obj(file, stem, progress)
                                           : export_streams(file, stem, progress);

@@ -56,7 +56,7 @@ TEST(PbrtExport, BakingAgainGivesTheSamePositions) {
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   Progress progress;
   const TemporaryFolder folder;
-  const Scene scene = import_again(write(folder, export_pbrt(file, "a", progress)));
+  const Scene scene = import_again(write(folder, export_pbrt(file, "a \"\\\xc3\xa9", progress)));
   const BakedScene again = test::bake(scene);
   const BakedFile back = BakedFile::from_bytes(again.bytes);
   EXPECT_EQ(test::world_faces(back), test::world_faces(file));

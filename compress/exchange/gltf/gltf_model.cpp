@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <string_view>
 
 #include "pbrt_import/base/error.h"
 
@@ -26,6 +27,21 @@ void append_word(std::vector<std::byte>& to, uint64_t value) {
     throw Error(ErrorKind::kLimitExceeded, "more than the 4 GiB that a .glb file holds");
   const auto word = static_cast<uint32_t>(value);
   append_bytes(to, &word, sizeof word);
+}
+
+/// A file name as a relative URI. Source: RFC 3986, section 2.
+std::string percent_encoded(const std::string& name) {
+  constexpr std::string_view kPlain = "-._~", kDigits = "0123456789ABCDEF";
+  std::string uri;
+  for (const char c : name) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    const auto byte = static_cast<unsigned char>(c);
+    if (letter || kPlain.find(c) != std::string_view::npos)
+      uri += c;
+    else
+      uri.append({'%', kDigits[byte >> 4], kDigits[byte & 15u]});
+  }
+  return uri;
 }
 
 } // namespace
@@ -147,7 +163,7 @@ std::vector<std::byte> GltfModel::write_binary() {
 
 std::vector<std::byte> GltfModel::write_text(const std::string& buffer_name) {
   finish();
-  if (!buffer_.empty()) json_["buffers"][0]["uri"] = buffer_name;
+  if (!buffer_.empty()) json_["buffers"][0]["uri"] = percent_encoded(buffer_name);
   const std::string text = json_.dump(1) + "\n";
   std::vector<std::byte> bytes;
   append_bytes(bytes, text.data(), text.size());

@@ -57,7 +57,7 @@ public:
   /// The whole document as binary glTF.
   std::vector<std::byte> write_binary();
   /// The JSON text of a document whose buffer is stored apart.
-  /// @param buffer_name file name of the buffer, UTF-8
+  /// @param buffer_name file name of the buffer
   std::vector<std::byte> write_text(const std::string& buffer_name);
   /// The bytes of the buffer.
   std::vector<std::byte> take_buffer() { return std::move(buffer_); }

@@ -43,6 +43,16 @@ std::vector<std::byte> ply_bytes(const PlainPrimitive& plain) {
   return bytes;
 }
 
+/// A file name as a string of pbrt holds it.
+std::string escaped(const std::string& name) {
+  std::string text;
+  for (const char c : name) {
+    if (c == '"' || c == '\\') text += '\\';
+    text += c;
+  }
+  return text;
+}
+
 class PbrtWriter {
 public:
   PbrtWriter(const BakedFile& file, const std::string& stem, Progress& progress)
@@ -104,8 +114,8 @@ private:
 
   template <class View>
   void add_texture(const std::string& name, std::string_view type, const std::string& image, const View& view) {
-    text_ +=
-        "Texture \"" + name + "\" \"" + std::string(type) + "\" \"imagemap\" \"string filename\" \"" + image + "\"";
+    text_ += "Texture \"" + name + "\" \"" + std::string(type) + "\" \"imagemap\" \"string filename\" \"" +
+             escaped(image) + "\"";
     line(" \"float uscale\" ", std::span(&view.uv_scale.x, 1), "");
     line(" \"float vscale\" ", std::span(&view.uv_scale.y, 1), "");
     line(" \"float udelta\" ", std::span(&view.uv_offset.x, 1), "");
@@ -148,8 +158,9 @@ private:
     const baked::GeometryRecord& lattice = file_.geometries()[geometry];
     text_ += "AttributeBegin\nNamedMaterial \"" + names_[material] + "\"\n";
     if ((record.flags & kEmissive) != 0) text_ += "AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\n";
-    text_ += "Shape \"plymesh\" \"string filename\" \"" + mesh_file(geometry, part) + "\" \"integer lattice\" [" +
-             std::to_string(lattice.step_mantissa) + " " + std::to_string(lattice.step_exponent) + "]";
+    text_ += "Shape \"plymesh\" \"string filename\" \"" + escaped(mesh_file(geometry, part)) +
+             "\" \"integer lattice\" [" + std::to_string(lattice.step_mantissa) + " " +
+             std::to_string(lattice.step_exponent) + "]";
     if ((record.flags & kAlphaMask) != 0 && record.alpha_mask != baked::kNone)
       text_ += " \"texture alpha\" \"" + names_[material] + " alpha\"";
     if ((record.flags & kShadowAlphaMask) != 0 && record.shadow_alpha_mask != baked::kNone)
