@@ -27,13 +27,14 @@
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/progress_display.h"
+#include "runtime/commands/shader_export.h"
 
 namespace packtrace {
 namespace {
 
-constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kPbrt = "pbrt", *kObj = "obj", *kStreams = "streams",
-                     *kDraco = "draco", *kMeshopt = "meshopt", *kNone = "none", *kPortable = "portable", *kWeb = "web",
-                     *kExchange = "exchange";
+constexpr const char *kShader = "glsl", *kVertex16 = "vertex16", *kGltf = "gltf", *kPbrt = "pbrt", *kObj = "obj",
+                     *kStreams = "streams", *kDraco = "draco", *kMeshopt = "meshopt", *kNone = "none",
+                     *kPortable = "portable", *kWeb = "web", *kExchange = "exchange";
 
 struct ExportOptions {
   std::string input, output;
@@ -44,6 +45,7 @@ struct ExportOptions {
   std::optional<int> level, normal_bits, uv_bits;
   std::optional<double> webp_psnr;
   bool instancing = false, levels = false;
+  ShaderOptions shader;
   bool has_gltf_option = false; ///< whether an option was given that applies to glTF only
 };
 
@@ -62,11 +64,16 @@ std::string layout_of(const ExportOptions& options) {
     std::string_view ending;
     const char* layout;
   };
-  constexpr std::array<Ending, 6> kEndings = {
-      {{".glb", kGltf}, {".gltf", kGltf}, {".v16", kVertex16}, {".pbrt", kPbrt}, {".obj", kObj}, {".json", kStreams}}};
+  constexpr std::array<Ending, 7> kEndings = {{{".glb", kGltf},
+                                               {".gltf", kGltf},
+                                               {".v16", kVertex16},
+                                               {".glsl", kShader},
+                                               {".pbrt", kPbrt},
+                                               {".obj", kObj},
+                                               {".json", kStreams}}};
   const std::string ending = ending_of(options.output);
   const auto known = std::ranges::find(kEndings, ending, &Ending::ending);
-  refuse_foreign_ending(options.output, {".glb", ".gltf", ".v16", ".pbrt", ".obj", ".json"}, "export", {});
+  refuse_foreign_ending(options.output, {".glb", ".gltf", ".v16", ".glsl", ".pbrt", ".obj", ".json"}, "export", {});
   const std::string asked = options.streams.empty() ? options.layout : kStreams;
   if (!options.streams.empty() && !options.layout.empty())
     throw Error(ErrorKind::kUsage, "--streams and --layout exclude each other");
@@ -74,8 +81,9 @@ std::string layout_of(const ExportOptions& options) {
   if (asked.empty() && options.output == "-")
     throw Error(ErrorKind::kUsage, "-o - has no extension to choose a layout by; add --layout gltf or vertex16");
   if (asked.empty())
-    throw FileError(ErrorKind::kUsage, options.output,
-                    "use the extension .glb, .gltf, .v16, .pbrt or .obj, or .json with --streams raw, or add --layout");
+    throw FileError(
+        ErrorKind::kUsage, options.output,
+        "use the extension .glb, .gltf, .v16, .glsl, .pbrt or .obj, or .json with --streams raw, or add --layout");
   if (known != kEndings.end() ? asked != known->layout : asked == kStreams)
     throw FileError(ErrorKind::kUsage, options.output,
                     asked == kStreams ? "--streams needs an output with the extension .json"
@@ -116,6 +124,10 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
   if (!is_baked_file(options.input))
     throw FileError(ErrorKind::kInput, options.input,
                     "not a packtrace baked file; create one with packtrace bake SCENE.pbrt -o FILE.ptk");
+  if (layout == kShader) {
+    ShaderExport result = export_shader(options.input, options.output, options.shader, budget, progress);
+    return {std::move(result.bytes), {}, std::move(result.json), std::move(result.text)};
+  }
   const MemoryReservation memory = reserve_decoded(options.input, budget);
   const BakedFile file = BakedFile::open(options.input);
   ExportNames names{options.input, options.output, {}, {}, {}};
@@ -158,6 +170,8 @@ void write_others(const ExportOptions& options, const std::vector<ExportedFile>&
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
+  if (layout != kShader && options.shader.any())
+    throw Error(ErrorKind::kUsage, "the options of shaders only apply to .glsl files (--layout glsl)");
   if (layout != kGltf && options.has_gltf_option)
     throw Error(
         ErrorKind::kUsage,
@@ -232,11 +246,13 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
       verb, options->output,
       "Output file (required): .glb, .gltf, .v16, .pbrt, .obj, or .json with --streams; or - for standard output "
       "together with --layout. Files that belong to it are beside it, in NAME_files, or NAME.bin");
-  verb.add_option("--layout", options->layout,
-                  "Output format. gltf is a glTF 2.0 file with materials, instances, textures and cameras; "
-                  "vertex16 has 16 bytes per vertex and 16- or 32-bit indices, for direct upload to a GPU (default: "
-                  "gltf for .glb and .gltf, vertex16 for .v16)")
-      ->check(one_of({kVertex16, kGltf}));
+  verb.add_option(
+          "--layout", options->layout,
+          "Output format. gltf is a glTF 2.0 file with materials, instances, textures and cameras; "
+          "vertex16 has 16 bytes per vertex and 16- or 32-bit indices, for direct upload to a GPU (default: "
+          "gltf for .glb and .gltf, vertex16 for .v16). glsl is one fragment shader that holds and traces voxels")
+      ->check(one_of({kVertex16, kGltf, kShader}));
+  add_shader_options(verb, options->shader);
   verb.add_option("--streams", options->streams,
                   "Write what the file stores as arrays: raw makes NumPy files (.npy), which the output, a .json file, "
                   "describes")

@@ -21,7 +21,9 @@
 #include "runtime/commands/render_setup.h"
 #include "runtime/commands/seam_report.h"
 #include "runtime/commands/sequence_render.h"
+#include "runtime/commands/voxel_render.h"
 #include "runtime/stopwatch.h"
+#include "runtime/voxels/proxy_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -65,6 +67,7 @@ void check_targets(const ImageOutputs& outputs, const JsonOutput& json, const De
 }
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
+  if (views_proxies(options)) return render_proxies(options, globals);
   validate(options.sequence);
   if (options.sequence.path) return render_sequence(options, globals);
   if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
@@ -99,6 +102,10 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
     result["seams"] = visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels,
                                          detail.camera_uses_levels() ? loop.detail() : nullptr);
   }
+  if (const auto* const proxies = dynamic_cast<const ProxyTracer*>(loop.tracers().back()))
+    result["proxies"] = {{"beyond_px", *options.proxy_beyond_px}, {"instances", proxies->proxied().size()}};
+  else if (options.proxy_beyond_px)
+    result["proxies"] = {{"beyond_px", *options.proxy_beyond_px}, {"instances", 0}};
   if (!report.seen && !globals.quiet)
     print_printable(options.input + ": warning: this camera sees nothing of the scene; try --camera auto\n", stderr);
   if (!globals.quiet) warn_of_flat_instances(options.input, first_tracer.flat_instances().size());
@@ -106,6 +113,9 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;
   print_render(text, result);
+  if (result.contains("proxies"))
+    fmt::print(text, "  proxies   occlusion rays see {} instances as voxels\n",
+               result["proxies"]["instances"].get<size_t>());
   if (globals.verbosity > 0)
     fmt::print(text, "{}", choices_text(options, globals, camera, config, loaded, first_tracer, timings));
   return 0;

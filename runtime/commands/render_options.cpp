@@ -135,6 +135,11 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
   add_shade_options(verb, options.shade);
   add_tracer_options(verb, options);
   add_lod_options(verb, options.lod);
+  verb.add_option("--proxy-beyond", options.proxy_beyond_px,
+                  "Occlusion rays see instances smaller than so many pixels as their voxels, for .ptk files baked with "
+                  "--proxy voxels")
+      ->type_name("PX")
+      ->group("Levels of detail");
   add_sequence_options(verb, options.sequence);
   add_scene_options(verb, options.scene);
   verb.footer("The image is the mean of --frames frames of --spp rays per pixel, denoised over time\n"
@@ -194,6 +199,7 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
   // A sequence has its own numbers of pictures and frames.
   const uint64_t frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
   config.frames = options.sequence.path ? 1 : static_cast<uint32_t>(std::min<uint64_t>(frames, ~0u));
+  config.proxy_beyond_px = options.proxy_beyond_px;
   config.validate();
   config.ao.radius = ao_radius(config.ao, source.world_bounds());
   return config;

@@ -42,6 +42,7 @@ struct RenderOptions {
   std::optional<std::string> gpu_device;
   std::optional<std::string> bvh;
   LodOptions lod;
+  std::optional<double> proxy_beyond_px; ///< FrameConfig::proxy_beyond_px
   SequenceOptions sequence;
 };
 

@@ -39,6 +39,12 @@ void FrameConfig::validate() const {
                   "image size times supersample exceeds 65536 per side or 2^28 pixels");
   detail.validate();
   packtrace::validate(shade);
+  if (!proxy_beyond_px) return;
+  require_setting(*proxy_beyond_px > 0.0 && *proxy_beyond_px <= 1e9,
+                  "--proxy-beyond must be a number of pixels above 0");
+  require_setting(!detail.error_px, "--proxy-beyond and --lod-error exclude each other");
+  require_setting(ao.interreflection == 0.0f,
+                  "--proxy-beyond requires an interreflection of 0: voxels have no material");
 }
 
 uint64_t picture_bytes(const FrameConfig& config) {

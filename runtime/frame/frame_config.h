@@ -82,6 +82,9 @@ struct FrameConfig {
   AoConfig ao;
   DenoiserConfig denoiser;
   DetailConfig detail;
+  /// Occlusion rays see instances smaller than so many pixels as the proxies of the file (small_instances()), > 0;
+  /// unset: as triangles. Not with levels of detail, interreflection or things that move.
+  std::optional<double> proxy_beyond_px;
 
   bool shades() const { return view != FrameView::kAo; }
   Exposure display() const { return {tone_map, exposure}; }

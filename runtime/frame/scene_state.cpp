@@ -9,6 +9,7 @@
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/mesh_motion.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/voxels/proxy_tracer.h"
 
 namespace packtrace {
 
@@ -103,6 +104,7 @@ std::vector<const RayTracer*> SceneState::tracers() const {
   std::vector<const RayTracer*> all;
   if (!detail_.camera_uses_levels()) all.push_back(level_0_.get());
   if (level_tracer_) all.push_back(level_tracer_.get());
+  if (proxy_tracer_) all.push_back(proxy_tracer_.get());
   return all;
 }
 
@@ -177,6 +179,21 @@ void SceneState::build_level_0(FrameReport& report) {
   else
     level_0_ = make_tracer(*scene_.source, scene_.file, scene_.backend);
   level_0_ = posed(std::move(level_0_));
+  report.times.build_s += building.seconds();
+}
+
+void SceneState::choose_proxies(const PrimaryCamera& view, double pixels, FrameReport& report) {
+  if (scene_.file == nullptr) throw Error(ErrorKind::kUnsupported, "--proxy-beyond requires a .ptk file with proxies");
+  if (!pose_.empty() || meshes_ || levels_)
+    throw Error(ErrorKind::kUnsupported, "--proxy-beyond does not work with things that move or change by distance");
+  const Stopwatch building;
+  std::vector<uint32_t> proxied = small_instances(*scene_.file, *scene_.source, view, pixels);
+  if (proxied != proxied_) {
+    proxied_ = std::move(proxied);
+    proxy_tracer_.reset(); // frees its memory first
+    if (!proxied_.empty())
+      proxy_tracer_ = std::make_unique<ProxyTracer>(*scene_.file, *scene_.source, proxied_, scene_.backend);
+  }
   report.times.build_s += building.seconds();
 }
 

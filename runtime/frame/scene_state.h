@@ -51,6 +51,10 @@ public:
   /// Makes the tracer of level 0 if there is none.
   void build_level_0(FrameReport& report);
 
+  /// Chooses the instances that occlusion rays see as proxies, and makes their tracer if they changed.
+  /// Throws Error(kUnsupported) without a file, or if something moves.
+  void choose_proxies(const PrimaryCamera& view, double pixels, FrameReport& report);
+
   /// Forgets the frame before.
   void reset();
   /// Returns what advance() depends on besides its arguments, for restore().
@@ -64,7 +68,7 @@ public:
   const SceneSource& traced_source() const;
   /// The source of the tracer of camera rays.
   const SceneSource& camera_source() const;
-  /// The tracers in use: the camera's, and with DetailConfig::only_occlusion also the occlusion rays'.
+  /// The tracers in use: the camera's, and with DetailConfig::only_occlusion or proxies also the occlusion rays'.
   std::vector<const RayTracer*> tracers() const;
 
   /// Transforms of all instances in the frame before; empty if none moves.
@@ -88,6 +92,8 @@ private:
   std::unique_ptr<DetailPlanner> planner_;
   std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced and nothing deforms
   std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
+  std::unique_ptr<RayTracer> proxy_tracer_; ///< null if no instance is seen as its proxy
+  std::vector<uint32_t> proxied_;           ///< by proxy_tracer_
   std::unique_ptr<MeshMotion> meshes_;      ///< null if no mesh deforms
   std::unique_ptr<InstanceBoxes> boxes_;    ///< null if nothing moves
   bool started_ = false;                    ///< there is a frame before

@@ -42,11 +42,19 @@ set(packtrace_public_headers
   compress/format/pages/page_contexts.h
   compress/format/shading/shading_codec.h
   compress/format/textures/texture_codec.h
+  compress/format/voxels/occupancy_format.h
+  compress/format/voxels/occupancy_stream.h
+  compress/format/voxels/proxy_codec.h
+  compress/format/voxels/proxy_format.h
+  compress/format/voxels/proxy_section.h
+  compress/format/voxels/voxel_set.h
   # packtrace::bake: a Scene to a baked file
   compress/bake/bake_config.h
   compress/bake/level_chain.h
   compress/bake/bake_scene.h
   compress/bake/grid/seam_gaps.h
+  compress/bake/proxies/proxy_config.h
+  compress/bake/proxies/voxel_rule.h
   # packtrace::vertex16: a baked file to vertex and index buffers
   compress/exchange/vertex16/vertex16.glsl
   compress/exchange/vertex16/vertex16_decode.h

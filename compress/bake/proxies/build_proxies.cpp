@@ -100,6 +100,15 @@ std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& confi
   return proxies;
 }
 
+std::optional<Proxy> build_proxy(const BakedFile& file, uint32_t geometry, const ProxyConfig& config,
+                                 const MemoryBudget& budget) {
+  const std::vector<uint32_t> runs = material_runs(file.sections())[geometry];
+  if (runs.empty()) return std::nullopt;
+  const OccludingTriangles source = occluding_triangles(file, geometry, runs);
+  if (source.triangles.empty()) return std::nullopt;
+  return build_voxels(file, geometry, runs, source, config, budget);
+}
+
 std::vector<std::byte> with_proxies(const BakedFile& file, std::span<const Proxy> proxies) {
   BakedSections sections = file.sections();
   baked::SummaryRecord summary = sections.summary.front();

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,10 @@ namespace packtrace {
 /// Throws like voxelize() and encode_occupancy(), and Error(kLimitExceeded) for more than 256 materials of a geometry.
 std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& config, const MemoryBudget& budget,
                                  Progress& progress, const std::function<void(std::string)>& warn);
+
+/// Builds the proxy of one geometry; nothing if it has no occluding triangle. Throws like build_proxies().
+std::optional<Proxy> build_proxy(const BakedFile& file, uint32_t geometry, const ProxyConfig& config,
+                                 const MemoryBudget& budget);
 
 /// The file with these proxies.
 /// @param file without proxies

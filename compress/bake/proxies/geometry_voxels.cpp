@@ -99,7 +99,7 @@ public:
 
   GeometryVoxels run() {
     result_.set = VoxelSet(grid_.size);
-    result_.frame = {vec(source_.low) * source_.step, grid_.edge_steps() * source_.step, grid_.size};
+    result_.frame = voxel_frame(source_, config_.voxels);
     for_each_pair([&](const OccludingTriangle&, VoxelIndex v) { result_.set.set(v); });
     const VoxelSet surface = result_.set;
     if (config_.fill && source_.closed) fill();
@@ -123,10 +123,7 @@ private:
   }
 
   void fill() {
-    VoxelSet inside(grid_.size);
-    for (const OccludingTriangle& t : source_.triangles) add_crossings(grid_.triangle(t), grid_.edge, inside);
-    prefix_parity(inside);
-    result_.set.merge(inside);
+    result_.set.merge(inside_voxels(source_, config_.voxels));
     result_.filled = true;
   }
 
@@ -200,6 +197,19 @@ GeometryVoxels voxelize(const BakedFile& file, std::span<const uint32_t> runs, c
                 "voxels: a grid has 1 to " + std::to_string(kMaxGridSize) + " voxels along its longest side");
   const MemoryReservation memory = reserve(source.extent, config.voxels, budget, what);
   return Voxelizer(file, runs, source, config).run();
+}
+
+VoxelFrame voxel_frame(const OccludingTriangles& source, uint32_t voxels) {
+  const FineGrid grid(source.extent, voxels);
+  return {vec(source.low) * source.step, grid.edge_steps() * source.step, grid.size};
+}
+
+VoxelSet inside_voxels(const OccludingTriangles& source, uint32_t voxels) {
+  const FineGrid grid(source.extent, voxels);
+  VoxelSet inside(grid.size);
+  for (const OccludingTriangle& t : source.triangles) add_crossings(grid.triangle(t), grid.edge, inside);
+  prefix_parity(inside);
+  return inside;
 }
 
 } // namespace packtrace

@@ -32,4 +32,10 @@ struct GeometryVoxels {
 GeometryVoxels voxelize(const BakedFile& file, std::span<const uint32_t> runs, const OccludingTriangles& source,
                         const ProxyConfig& config, const MemoryBudget& budget, const std::string& what);
 
+/// The grid of voxelize() over a geometry.
+VoxelFrame voxel_frame(const OccludingTriangles& source, uint32_t voxels);
+
+/// The voxels whose centres lie inside a closed geometry.
+VoxelSet inside_voxels(const OccludingTriangles& source, uint32_t voxels);
+
 } // namespace packtrace

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// Dialects of exported shaders.
+enum class ShaderForm : uint32_t {
+  kShadertoy, ///< GLSL ES 3.00 with Shadertoy's conventions: mainImage(), iResolution
+  kGlsl450,   ///< a fragment shader for Vulkan: out vec4 at location 0, resolution as a push constant
+};
+
+/// Published limits of constant arrays, in 32-bit elements.
+inline constexpr uint32_t kMaxShaderElements = 4096;      ///< of Shadertoy on most devices
+inline constexpr uint32_t kPortableShaderElements = 1024; ///< for wide support
+
+struct ShaderConfig {
+  ShaderForm form = ShaderForm::kShadertoy;
+  uint32_t max_elements = kMaxShaderElements;
+};
+
+/// A float as GLSL reads it back to the same bits.
+std::string glsl_float(float value);
+std::string glsl_vec3(Vec3 value);
+/// "const uint NAME[COUNT] = uint[COUNT](...);" and a newline.
+std::string glsl_words(const std::string& name, std::span<const uint32_t> words);
+/// "const int NAME[COUNT] = int[COUNT](...);" and a newline.
+std::string glsl_ints(const std::string& name, std::span<const int32_t> values);
+
+/// What comes before and after the functions of a form. The functions define vec3 picture(vec2 pixel, vec2 resolution),
+/// pixel with its zero at the lower left, centres at halves.
+std::string glsl_begin(ShaderForm form);
+std::string glsl_end(ShaderForm form);
+
+} // namespace packtrace

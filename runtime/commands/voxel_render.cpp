@@ -1,0 +1,111 @@
+#include "runtime/commands/voxel_render.h"
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pbrt_import/base/file_error.h"
+#include "runtime/commands/binary_output.h"
+#include "runtime/commands/file_report.h"
+#include "runtime/commands/image_outputs.h"
+#include "runtime/commands/json_output.h"
+#include "runtime/commands/option_checks.h"
+#include "runtime/commands/progress_display.h"
+#include "runtime/commands/render_camera.h"
+#include "runtime/image/background.h"
+#include "runtime/image/png.h"
+#include "runtime/stopwatch.h"
+#include "runtime/voxels/voxel_picture.h"
+
+namespace packtrace {
+namespace {
+
+constexpr const char* kVoxelView = "voxels";
+
+/// Options that other views have, and that would be ignored here.
+void refuse_other_options(const RenderOptions& options) {
+  const bool sequence = options.sequence.path || options.sequence.keys || options.sequence.start_time;
+  const std::array<std::pair<const char*, bool>, 8> given = {{{"--aov", !options.aovs.empty()},
+                                                              {"--frames", options.frames.has_value()},
+                                                              {"--ground-truth", options.ground_truth},
+                                                              {"--supersample", options.supersample != 1},
+                                                              {"--backend", options.backend.has_value()},
+                                                              {"--bvh", options.bvh.has_value()},
+                                                              {"--lod-error", options.lod.error_px.has_value()},
+                                                              {"--path, --keys and --start-time", sequence}}};
+  for (const auto& [name, is_given] : given)
+    if (is_given) throw Error(ErrorKind::kUsage, std::string(name) + " has no effect with --view voxels");
+}
+
+Image picture_of(const VoxelPicture& traced, ImageSize size) {
+  Image image(size, 3);
+  for (size_t i = 0; i < traced.color.size(); ++i)
+    for (size_t c = 0; c < 3; ++c)
+      image.data[3 * i + c] = srgb_from_linear(traced.color[i][static_cast<glm::length_t>(c)]);
+  return image;
+}
+
+} // namespace
+
+bool views_proxies(const RenderOptions& options) { return options.shade.view == kVoxelView; }
+
+int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
+  if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
+  refuse_other_options(options);
+  if (options.outputs.size() != 1) throw Error(ErrorKind::kUsage, "--view voxels writes one .png file");
+  refuse_foreign_ending(options.outputs.front(), {".png"}, "render --view voxels", {});
+  JsonOutput json(globals.json, globals.force);
+  BinaryOutput output(options.outputs.front(), globals.force, json);
+  ProgressDisplay display(globals);
+  Progress progress(display.observer());
+  const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display, options.private_copy);
+  const std::optional<VoxelScene> scene =
+      loaded.baked ? std::optional<VoxelScene>(std::in_place, *loaded.baked) : std::nullopt;
+  if (!scene || scene->proxies().empty())
+    throw FileError(ErrorKind::kUnsupported, options.input, "it has no voxels; bake it with --proxy voxels");
+  const ChosenCamera chosen = choose_camera(*loaded.source, options, globals);
+  const StillConfig still = make_config(*loaded.source, chosen.camera, options, {});
+  const PrimaryCamera camera(chosen.camera, still.size);
+  const MemoryReservation pixels(globals.memory, still.size.pixels() * 48, "a picture");
+  VoxelPictureConfig config;
+  config.samples = options.spp.value_or(config.samples);
+  config.radius = static_cast<double>(still.ao.radius);
+  progress.begin("tracing voxels", still.size.height);
+  const Stopwatch tracing;
+  const VoxelPicture traced = trace_voxel_picture(*scene, camera, config, progress);
+  const double seconds = tracing.seconds();
+  const Background background = parse_background(options.background.value_or("c8ccd8"));
+  output.write(
+      encode_png(over_background(picture_of(traced, still.size), traced.coverage, background), PngTransfer::kRaw));
+  display.finish();
+  if (!globals.quiet && scene->flat_instances() > 0)
+    print_printable(fmt::format("{}: warning: {} instances are not traced: flattened by their transform\n",
+                                options.input, scene->flat_instances()),
+                    stderr);
+  const double rate = static_cast<double>(traced.rays) * 1e-6 / seconds;
+  if (json.wanted())
+    json.write({{"verb", "render"},
+                {"view", kVoxelView},
+                {"input", options.input},
+                {"outputs", options.outputs},
+                {"width", still.size.width},
+                {"height", still.size.height},
+                {"instances", scene->instance_count()},
+                {"instances_without_proxy", scene->instances_without_proxy()},
+                {"flat_instances", scene->flat_instances()},
+                {"resident_bytes", scene->resident_bytes()},
+                {"rays", traced.rays},
+                {"trace_s", seconds},
+                {"mrays_per_s", rate}});
+  if (json.to_stdout() || globals.quiet) return 0;
+  fmt::print(output.text_stream(),
+             "voxels of {} instances ({} without), {} bytes resident; {} rays in {:.3f} s, {:.2f} Mrays/s\n",
+             scene->instance_count(), scene->instances_without_proxy(), scene->resident_bytes(), traced.rays, seconds,
+             rate);
+  return 0;
+}
+
+} // namespace packtrace

@@ -1,0 +1,81 @@
+#include "runtime/voxels/field_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/ao/hemisphere.h"
+
+namespace packtrace {
+
+glm::vec3 FieldTracer::gradient(glm::vec3 p) const {
+  constexpr float kStep = 0.5f;
+  glm::vec3 g;
+  for (int a = 0; a < 3; ++a) {
+    glm::vec3 step(0.0f);
+    step[a] = kStep;
+    g[a] = field_->distance(p + step) - field_->distance(p - step);
+  }
+  const float length = glm::length(g);
+  return length > 0.0f ? g / length : g;
+}
+
+std::optional<FieldHit> FieldTracer::first_hit(glm::vec3 origin, glm::vec3 direction, float t_min, float t_max) const {
+  float enter = t_min, leave = t_max;
+  for (int a = 0; a < 3; ++a) {
+    const float last = static_cast<float>(field_->size()[static_cast<size_t>(a)] - 1);
+    if (direction[a] == 0.0f) {
+      if (!(origin[a] >= 0.0f && origin[a] <= last)) return std::nullopt;
+      continue;
+    }
+    const float x = -origin[a] / direction[a], y = (last - origin[a]) / direction[a];
+    enter = std::max(enter, std::min(x, y)), leave = std::min(leave, std::max(x, y));
+  }
+  // Interpolated distances may exceed the true ones a little: shorter steps do not pass through thin things.
+  constexpr float kCaution = 0.85f, kLeastStep = 0.02f;
+  for (float t = enter; t <= leave;) {
+    const glm::vec3 p = origin + t * direction;
+    const float signed_distance = field_->distance(p),
+                distance = has_sign_ ? signed_distance : std::abs(signed_distance);
+    if (distance < kSurface) {
+      glm::vec3 normal = gradient(p);
+      if (glm::dot(normal, direction) > 0.0f) normal = -normal;
+      return FieldHit{t, normal};
+    }
+    t += std::max(kCaution * distance, kLeastStep);
+  }
+  return std::nullopt;
+}
+
+float FieldTracer::tap_visibility(glm::vec3 p, glm::vec3 normal, float radius) const {
+  float missing = 0.0f, weights = 0.0f;
+  for (int tap = 1; tap <= 5; ++tap) {
+    const float height = radius * static_cast<float>(tap) / 5.0f, weight = std::exp2(-static_cast<float>(tap));
+    // Distances beyond the band are only lower bounds.
+    const float reach = std::min(height, static_cast<float>(voxels::kFieldBand) - 1.0f);
+    missing += weight * std::clamp(1.0f - std::abs(field_->distance(p + normal * height)) / reach, 0.0f, 1.0f);
+    weights += weight;
+  }
+  return 1.0f - missing / weights;
+}
+
+float FieldTracer::cone_visibility(glm::vec3 p, glm::vec3 normal, float radius) const {
+  // One cone along the normal and five around it share the hemisphere. The outer ones just touch an even surface.
+  constexpr float kTangent = 0.5f, kKnown = static_cast<float>(voxels::kFieldBand) - 1.0f;
+  float sum = 0.0f, weights = 0.0f;
+  for (int cone = 0; cone < 6; ++cone) {
+    const float angle = 1.2566371f * static_cast<float>(cone), sine = cone == 0 ? 0.0f : 0.8660254f;
+    const glm::vec3 local(sine * std::cos(angle), sine * std::sin(angle), cone == 0 ? 1.0f : 0.5f);
+    const glm::vec3 way = turned_to(normal, local);
+    float open = 1.0f;
+    for (float t = 1.0f; t < radius;) {
+      const float distance = field_->distance(p + way * t), width = std::min(kTangent * t, kKnown);
+      if (distance < width) open = std::min(open, std::clamp(0.5f + 0.5f * distance / width, 0.0f, 1.0f));
+      if (open <= 0.0f) break;
+      t += std::max(std::abs(distance), 0.5f);
+    }
+    sum += local.z * open, weights += local.z;
+  }
+  return sum / weights;
+}
+
+} // namespace packtrace

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "pbrt_import/scene/camera_rays.h"
+#include "runtime/trace/make_tracer.h"
+#include "runtime/voxels/voxel_scene.h"
+
+namespace packtrace {
+
+/// Instances that have a voxel proxy and are seen smaller than so many pixels: the diameter of the sphere around their
+/// box over the length of a pixel at its nearest point. Flat instances are not among them. Ascending.
+/// @param source of the file, as it is placed
+std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& source, const PrimaryCamera& view,
+                                      double pixels);
+
+/// Traces some instances of a file as voxels, and the others as another tracer does. For occlusion rays: hits of voxels
+/// have a distance, but no surface to resolve().
+///
+/// A ray that begins in the grid of an instance ignores that instance's voxels for the length of a voxel's diagonal, so
+/// that surfaces do not occlude themselves; what is nearer is smaller than the proxy's error.
+class ProxyTracer final : public RayTracer {
+public:
+  /// @param proxied instances, as small_instances() gives them; not empty
+  /// @param config of the tracer of the others, without movers
+  /// Throws like make_tracer().
+  ProxyTracer(const BakedFile& file, const SceneSource& source, std::vector<uint32_t> proxied,
+              const TracerConfig& config);
+
+  std::string_view name() const override { return others_->name(); }
+  std::string_view isa() const override { return others_->isa(); }
+  const UnitSpace& space() const override { return others_->space(); }
+  uint32_t preferred_rays_per_call() const override { return others_->preferred_rays_per_call(); }
+  void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                    std::span<RayHit> hits) const override;
+  void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                std::span<uint8_t> occluded) const override;
+  /// @param hit not of a voxel
+  HitSurface resolve(const RayHit& hit) const override { return others_->resolve(hit); }
+  /// Those of the tracer of the others, and "proxies".
+  std::vector<ResidentPart> resident() const override;
+  std::vector<TreeBytes> tree_bytes() const override { return others_->tree_bytes(); }
+
+  std::span<const uint32_t> proxied() const { return proxied_; }
+
+private:
+  /// Where a ray meets a voxel before its tfar; tfar if it does not.
+  float voxel_distance(const Ray& ray) const;
+
+  std::vector<uint32_t> proxied_;
+  VoxelScene voxels_;
+  std::unique_ptr<RayTracer> others_;
+};
+
+} // namespace packtrace

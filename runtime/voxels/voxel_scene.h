@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "compress/format/file/baked_file.h"
+#include "compress/format/voxels/proxy_codec.h"
+#include "runtime/voxels/thing_tree.h"
+
+namespace packtrace {
+
+/// Where a ray meets the voxels of an instance.
+struct SceneVoxelHit {
+  double t = 0.0;
+  uint32_t instance = 0;
+  VoxelIndex voxel{};
+  DVec3 normal{0.0}; ///< unit, world space, of the face that the ray enters through, towards the ray's origin
+  double edge = 0.0; ///< length of a voxel along the normal, world units
+  Vec3 albedo{0.8f}; ///< linear; of the voxel's swatch if it has one
+};
+
+/// The instances of a file as voxels, in the coordinates of the file (relative to BakedFile::origin()).
+class VoxelScene {
+public:
+  /// @param wanted whether an instance takes part; called for those that have a proxy
+  explicit VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)>& wanted = {});
+
+  /// The first voxel in [t_min, t_max).
+  std::optional<SceneVoxelHit> first_hit(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
+  bool occluded(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
+
+  /// For rays from surfaces that the voxels stand for: like first_hit(), but an instance's voxels do not count within a
+  /// voxel's diagonal of the origin if that lies in the instance's grid. Returns t, or t_max without a hit.
+  double first_distance(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
+
+  size_t instance_count() const { return placed_.size(); }
+  /// Instances with a proxy that a transform flattens to a plane, a line or a point; they are not traced.
+  uint64_t flat_instances() const { return flat_; }
+  uint64_t instances_without_proxy() const { return without_; }
+  /// Bytes of all streams and of what is needed to trace them.
+  uint64_t resident_bytes() const;
+  const std::vector<Proxy>& proxies() const { return proxies_; }
+
+private:
+  struct Placed {
+    uint32_t instance, proxy;
+    DAffine grid_from_world;
+    glm::dmat3 world_normal; ///< normals of the grid to the world, not of unit length
+  };
+
+  std::vector<Proxy> proxies_;
+  std::vector<Placed> placed_;
+  ThingTree tree_;
+  uint64_t flat_ = 0, without_ = 0;
+};
+
+} // namespace packtrace

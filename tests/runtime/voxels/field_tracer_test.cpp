@@ -1,0 +1,94 @@
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "compress/format/voxels/distance_field.h"
+#include "runtime/ao/hemisphere.h"
+#include "runtime/voxels/field_tracer.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kSize = 64;
+
+template <class Distance>
+DistanceField field_of(const Distance& distance) {
+  std::vector<float> distances;
+  for (uint32_t z = 0; z < kSize; ++z)
+    for (uint32_t y = 0; y < kSize; ++y)
+      for (uint32_t x = 0; x < kSize; ++x) distances.push_back(distance(glm::vec3(x, y, z)));
+  return encode_field({kSize, kSize, kSize}, distances, 16);
+}
+
+/// A ball on a floor, both thick.
+float ball_on_floor(glm::vec3 p) { return std::min(glm::length(p - glm::vec3(32, 26, 32)) - 14.0f, p.y - 10.0f); }
+
+TEST(FieldTracer, RaysMeetABallWhereItIs) {
+  const DistanceField field = field_of([](glm::vec3 p) { return glm::length(p - 32.0f) - 20.0f; });
+  const FieldTracer tracer(field, true);
+  std::mt19937 random(4);
+  const auto uniform = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
+  uint64_t hits = 0, wrong = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const glm::vec3 eye =
+        32.0f + 80.0f * glm::normalize(2.0f * glm::vec3(uniform(), uniform(), uniform()) - 1.0f + 1e-5f);
+    const glm::vec3 way = glm::normalize(64.0f * glm::vec3(uniform(), uniform(), uniform()) - eye);
+    const float b = glm::dot(32.0f - eye, way), miss = glm::length(32.0f - eye - b * way);
+    const auto hit = tracer.first_hit(eye, way, 0.0f, 1e9f);
+    if (std::abs(miss - 20.0f) < 0.3f) continue; // grazes
+    wrong += hit.has_value() != (miss < 20.0f);
+    if (!hit || miss >= 20.0f) continue;
+    ++hits;
+    const float t = b - std::sqrt(400.0f - miss * miss);
+    if (miss < 19.0f) {
+      ASSERT_NEAR(hit->t, t, 0.3f);
+      ASSERT_GT(glm::dot(hit->normal, (eye + t * way - 32.0f) / 20.0f), 0.99f);
+    }
+  }
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_GT(hits, 1000u);
+}
+
+TEST(FieldTracer, OcclusionByTapsAndConesIsNearThatOfRays) {
+  const DistanceField field = field_of(ball_on_floor);
+  const FieldTracer tracer(field, true);
+  constexpr float kRadius = 12.0f;
+  std::mt19937 random(6);
+  const auto uniform = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
+  double tap_error = 0.0, cone_error = 0.0, plain_error = 0.0;
+  int count = 0;
+  for (float x = 18.0f; x < 47.0f; x += 2.0f)
+    for (float z = 18.0f; z < 47.0f; z += 2.0f) {
+      const glm::vec3 p(x, 10.2f, z), up(0, 1, 0);
+      if (ball_on_floor(p) < 0.15f) continue;
+      int open = 0;
+      constexpr int kRays = 256;
+      for (int r = 0; r < kRays; ++r)
+        open +=
+            !tracer.first_hit(p + 0.3f * up, turned_to(up, cosine_direction({uniform(), uniform()})), 0.0f, kRadius);
+      const double truth = static_cast<double>(open) / kRays;
+      tap_error += std::abs(tracer.tap_visibility(p, up, kRadius) - truth);
+      cone_error += std::abs(tracer.cone_visibility(p, up, kRadius) - truth);
+      plain_error += 1.0 - truth;
+      ++count;
+    }
+  tap_error /= count, cone_error /= count, plain_error /= count;
+  std::printf("mean error against rays: taps %.3f, cones %.3f, no occlusion %.3f\n", tap_error, cone_error,
+              plain_error);
+  EXPECT_LT(cone_error, 0.12);
+  EXPECT_LT(tap_error, 0.25);
+  EXPECT_LT(cone_error, plain_error);
+}
+
+TEST(FieldTracer, AnOpenFloorIsNotOccluded) {
+  const DistanceField field = field_of([](glm::vec3 p) { return p.y - 10.0f; });
+  const FieldTracer tracer(field, true);
+  EXPECT_GT(tracer.tap_visibility({32, 10.1f, 32}, {0, 1, 0}, 12.0f), 0.9f);
+  EXPECT_GT(tracer.cone_visibility({32, 10.1f, 32}, {0, 1, 0}, 12.0f), 0.9f);
+}
+
+} // namespace
+} // namespace packtrace
