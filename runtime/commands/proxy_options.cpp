@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-constexpr const char *kNoProxy = "off", *kVoxelsName = "voxels";
+constexpr const char *kNoProxy = "off", *kVoxelsName = "voxels", *kFieldName = "sdf";
 constexpr const char *kConservativeName = "conservative", *kThinName = "thin";
 
 } // namespace
@@ -17,8 +17,9 @@ void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
   verb.add_option(
           "--proxy", options.proxy,
           "Store a stand-in for each instanced geometry, or for each geometry if none is instanced. voxels: one "
-          "bit where the surface passes, in a tree that any voxel can be read from (default off)")
-      ->check(one_of({kNoProxy, kVoxelsName}))
+          "bit where the surface passes, in a tree that any voxel can be read from. sdf: distances to the surface "
+          "near it (default off)")
+      ->check(one_of({kNoProxy, kVoxelsName, kFieldName}))
       ->default_str(kNoProxy)
       ->group(kGroup);
   verb.add_option("--proxy-voxels", options.voxels,
@@ -29,6 +30,10 @@ void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
                   "Which voxels are set. conservative: all that the surface touches; thin: fewer, without holes that a "
                   "path through faces could pass (default conservative)")
       ->check(one_of({kConservativeName, kThinName}))
+      ->group(kGroup);
+  verb.add_option("--proxy-bits", options.field_bits, "Bits of a distance with --proxy sdf, 8 or 16 (default 8)")
+      ->check(CLI::IsMember({8u, 16u}))
+      ->type_name("N")
       ->group(kGroup);
   verb.add_flag("--proxy-fill", options.fill,
                 "Also set the voxels inside closed geometries, which takes fewer bits; open ones are reported")
@@ -43,11 +48,16 @@ void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
 ProxyConfig make_proxy_config(const ProxyOptions& options) {
   ProxyConfig config;
   if (options.proxy == kNoProxy) {
-    if (options.voxels || options.rule || options.fill || options.dag || options.materials)
-      throw Error(ErrorKind::kUsage, "the --proxy- options require --proxy voxels");
+    if (options.voxels || options.rule || options.field_bits || options.fill || options.dag || options.materials)
+      throw Error(ErrorKind::kUsage, "the --proxy- options require --proxy voxels or sdf");
     return config;
   }
-  config.use = ProxyUse::kVoxels;
+  config.use = options.proxy == kFieldName ? ProxyUse::kField : ProxyUse::kVoxels;
+  if (config.use == ProxyUse::kField && (options.rule || options.fill || options.dag || options.materials))
+    throw Error(ErrorKind::kUsage, "--proxy-surface, -fill, -dag and -materials require --proxy voxels");
+  if (config.use == ProxyUse::kVoxels && options.field_bits)
+    throw Error(ErrorKind::kUsage, "--proxy-bits requires --proxy sdf");
+  config.field_bits = options.field_bits.value_or(config.field_bits);
   config.voxels = options.voxels.value_or(config.voxels);
   if (config.voxels < 1 || config.voxels > kMaxGridSize)
     throw Error(ErrorKind::kUsage,

@@ -14,6 +14,7 @@ struct ProxyOptions {
   std::string proxy = "off";
   std::optional<uint32_t> voxels;
   std::optional<std::string> rule;
+  std::optional<uint32_t> field_bits;
   bool fill = false, dag = false, materials = false;
 };
 

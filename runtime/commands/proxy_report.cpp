@@ -14,7 +14,17 @@ const char* surface_of(const ProxySummary& use) { return (use.flags & voxels::kT
 
 double per_diagonal(const ProxySummary& use, double error) { return error / (use.edge * std::sqrt(3.0)); }
 
+std::string field_line(const ProxySummary& use) {
+  return fmt::format(grouped(),
+                     "proxy {}: distance field {} x {} x {}, {}, edge {:.4g}; {:L} samples stored in {:L} bits, error "
+                     "{:.3g} within {} voxels of the surface\n",
+                     use.name.empty() ? "(no name)" : use.name, use.size[0], use.size[1], use.size[2],
+                     (use.flags & voxels::kSigned) != 0 ? "signed" : "unsigned: the geometry is open", use.edge,
+                     use.stored_voxels, use.bits, use.surface_error, voxels::kFieldBand);
+}
+
 std::string line_of(const ProxySummary& use) {
+  if (use.kind == voxels::kFieldProxy) return field_line(use);
   std::string text =
       fmt::format(grouped(),
                   "proxy {}: voxels {} x {} x {}, {}{}, edge {:.4g}; {:L} voxels stored in {:L} bits ({:.2f} per "
@@ -54,12 +64,13 @@ nlohmann::json proxies_json(const FileSummary& s) {
   nlohmann::json json = nlohmann::json::array();
   for (const ProxySummary& use : s.proxies)
     json.push_back({{"geometry", use.name},
-                    {"kind", "voxels"},
+                    {"kind", use.kind == voxels::kFieldProxy ? "sdf" : "voxels"},
                     {"size", use.size},
                     {"edge", use.edge},
                     {"surface", surface_of(use)},
                     {"closed", (use.flags & voxels::kClosedSource) != 0},
                     {"filled", (use.flags & voxels::kFilled) != 0},
+                    {"signed", (use.flags & voxels::kSigned) != 0},
                     {"stored_voxels", use.stored_voxels},
                     {"bits", use.bits},
                     {"index_bits", use.index_bits},

@@ -15,8 +15,9 @@ void add_shade_options(CLI::App& verb, ShadeOptions& options) {
   verb.add_option("--view", options.view,
                   "What to render. ao is ambient occlusion; pbr is shaded with the scene's materials and lights, with "
                   "reflections and glass; pbr+ao lets occlusion darken its ambient light. A .ptk file must be baked "
-                  "with --for shading. voxels shows the proxies of a .ptk file, baked with --proxy voxels (default ao)")
-      ->check(one_of({"ao", "pbr", "pbr+ao", "voxels"}))
+                  "with --for shading. voxels shows the proxies of a .ptk file, baked with --proxy voxels; sdf its "
+                  "distance fields (default ao)")
+      ->check(one_of({"ao", "pbr", "pbr+ao", "voxels", "sdf"}))
       ->default_str(options.view)
       ->group(kGroup);
   verb.add_option("--exposure", options.exposure,

@@ -49,6 +49,7 @@ public:
     if (const std::span<const uint8_t> bytes = proxy_bytes(file); !bytes.empty()) stored_ = read_proxies(bytes);
     geometry_ = find_geometry(file, input, options.geometry, stored_);
     ProxyOptions proxy = options.proxy;
+    if (proxy.proxy == "sdf") throw Error(ErrorKind::kUsage, "shaders hold voxels: use --proxy voxels");
     proxy.proxy = "voxels";
     config_ = make_proxy_config(proxy);
     build_ = options.proxy.voxels || options.proxy.rule || options.proxy.fill || options.proxy.dag ||
@@ -59,7 +60,7 @@ public:
 
   Proxy run() const {
     const auto found = std::ranges::find(stored_, geometry_, [](const Proxy& p) { return p.record.geometry; });
-    const bool stored = !build_ && found != stored_.end();
+    const bool stored = !build_ && found != stored_.end() && !found->is_field();
     Proxy proxy = stored ? *found : build(config_.voxels);
     if (shader_elements(proxy) <= limit_) return proxy;
     const VoxelIndex& size = proxy.voxels.size();

@@ -23,7 +23,7 @@
 namespace packtrace {
 namespace {
 
-constexpr const char* kVoxelView = "voxels";
+constexpr const char *kVoxelView = "voxels", *kFieldView = "sdf";
 
 /// Options that other views have, and that would be ignored here.
 void refuse_other_options(const RenderOptions& options) {
@@ -50,7 +50,9 @@ Image picture_of(const VoxelPicture& traced, ImageSize size) {
 
 } // namespace
 
-bool views_proxies(const RenderOptions& options) { return options.shade.view == kVoxelView; }
+bool views_proxies(const RenderOptions& options) {
+  return options.shade.view == kVoxelView || options.shade.view == kFieldView;
+}
 
 int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
   if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
@@ -64,8 +66,9 @@ int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
   const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display, options.private_copy);
   const std::optional<VoxelScene> scene =
       loaded.baked ? std::optional<VoxelScene>(std::in_place, *loaded.baked) : std::nullopt;
-  if (!scene || scene->proxies().empty())
-    throw FileError(ErrorKind::kUnsupported, options.input, "it has no voxels; bake it with --proxy voxels");
+  if (!scene || scene->proxies().empty() || scene->proxies().front().is_field() != (options.shade.view == kFieldView))
+    throw FileError(ErrorKind::kUnsupported, options.input,
+                    "it has no such proxies; bake it with --proxy " + options.shade.view);
   const ChosenCamera chosen = choose_camera(*loaded.source, options, globals);
   const StillConfig still = make_config(*loaded.source, chosen.camera, options, {});
   const PrimaryCamera camera(chosen.camera, still.size);
@@ -88,7 +91,9 @@ int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
   const double rate = static_cast<double>(traced.rays) * 1e-6 / seconds;
   if (json.wanted())
     json.write({{"verb", "render"},
-                {"view", kVoxelView},
+                {"view", options.shade.view},
+                {"tap_error", traced.field_pixels > 0 ? nlohmann::json(traced.tap_error) : nlohmann::json()},
+                {"cone_error", traced.field_pixels > 0 ? nlohmann::json(traced.cone_error) : nlohmann::json()},
                 {"input", options.input},
                 {"outputs", options.outputs},
                 {"width", still.size.width},
@@ -102,9 +107,12 @@ int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
                 {"mrays_per_s", rate}});
   if (json.to_stdout() || globals.quiet) return 0;
   fmt::print(output.text_stream(),
-             "voxels of {} instances ({} without), {} bytes resident; {} rays in {:.3f} s, {:.2f} Mrays/s\n",
+             "proxies of {} instances ({} without), {} bytes resident; {} rays in {:.3f} s, {:.2f} Mrays/s\n",
              scene->instance_count(), scene->instances_without_proxy(), scene->resident_bytes(), traced.rays, seconds,
              rate);
+  if (traced.field_pixels > 0)
+    fmt::print(output.text_stream(), "mean difference of visibility from that of the rays: taps {:.3f}, cones {:.3f}\n",
+               traced.tap_error, traced.cone_error);
   return 0;
 }
 

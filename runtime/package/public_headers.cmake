@@ -42,6 +42,8 @@ set(packtrace_public_headers
   compress/format/pages/page_contexts.h
   compress/format/shading/shading_codec.h
   compress/format/textures/texture_codec.h
+  compress/format/voxels/distance_field.h
+  compress/format/voxels/field_format.h
   compress/format/voxels/occupancy_format.h
   compress/format/voxels/occupancy_stream.h
   compress/format/voxels/proxy_codec.h

@@ -30,6 +30,11 @@ VoxelPicture trace_voxel_picture(const VoxelScene& scene, const PrimaryCamera& c
   VoxelPicture picture;
   picture.color.resize(size.pixels(), Vec3(0.0f)), picture.coverage.resize(size.pixels(), 0.0f);
   std::atomic<uint64_t> rays{0};
+  struct RowErrors {
+    uint64_t pixels = 0;
+    double taps = 0.0, cones = 0.0;
+  };
+  std::vector<RowErrors> errors(size.height); // summed in order, so that the result does not depend on threads
   tbb::parallel_for(0u, size.height, [&](uint32_t y) {
     progress.check_cancelled();
     uint64_t traced = size.width;
@@ -37,7 +42,7 @@ VoxelPicture trace_voxel_picture(const VoxelScene& scene, const PrimaryCamera& c
       const CameraRay ray = camera.ray(x, y);
       const auto hit = scene.first_hit(ray.origin, ray.direction, 0.0, std::numeric_limits<double>::infinity());
       if (!hit) continue;
-      const DVec3 origin = ray.origin + hit->t * ray.direction + 1e-3 * hit->edge * hit->normal;
+      const DVec3 origin = ray.origin + hit->t * ray.direction + (hit->is_field ? 0.3 : 1e-3) * hit->edge * hit->normal;
       const uint32_t pixel = y * size.width + x;
       uint32_t open = 0;
       for (uint32_t s = 0; s < config.samples; ++s) {
@@ -48,11 +53,23 @@ VoxelPicture trace_voxel_picture(const VoxelScene& scene, const PrimaryCamera& c
       picture.color[pixel] =
           hit->albedo * (static_cast<float>(open) / static_cast<float>(std::max(config.samples, 1u)));
       picture.coverage[pixel] = 1.0f;
+      const double visibility = static_cast<double>(open) / std::max(config.samples, 1u);
+      if (const auto field = scene.field_visibility(*hit, origin, config.radius)) {
+        ++errors[y].pixels;
+        errors[y].taps += std::abs(double{field->taps} - visibility);
+        errors[y].cones += std::abs(double{field->cones} - visibility);
+      }
     }
     rays += traced;
     progress.advance();
   });
   picture.rays = rays;
+  for (const RowErrors& row : errors)
+    picture.field_pixels += row.pixels, picture.tap_error += row.taps, picture.cone_error += row.cones;
+  if (picture.field_pixels > 0) {
+    picture.tap_error /= static_cast<double>(picture.field_pixels);
+    picture.cone_error /= static_cast<double>(picture.field_pixels);
+  }
   return picture;
 }
 

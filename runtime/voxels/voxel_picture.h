@@ -19,6 +19,9 @@ struct VoxelPicture {
   std::vector<Vec3> color;     ///< linear: albedo times visibility; 0 where nothing is hit
   std::vector<float> coverage; ///< 1 where a voxel is hit, else 0
   uint64_t rays = 0;           ///< camera and occlusion rays
+  uint64_t field_pixels = 0;   ///< that show a distance field
+  /// Mean over those of the difference of visibility from that of the occlusion rays: taps along the normal, and cones.
+  double tap_error = 0.0, cone_error = 0.0;
 };
 
 /// Traces a ray through each pixel's centre, and cosine-weighted occlusion rays from the face that it hits. The result

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "compress/format/voxels/proxy_section.h"
+#include "runtime/voxels/field_tracer.h"
 #include "runtime/voxels/voxel_tracer.h"
 
 namespace packtrace {
@@ -20,6 +21,30 @@ Vec3 linear_color(uint32_t srgb) {
 /// Object space from voxel units.
 DAffine grid_placement(const VoxelFrame& frame) {
   return DAffine(DVec3(frame.edge, 0, 0), DVec3(0, frame.edge, 0), DVec3(0, 0, frame.edge), frame.origin);
+}
+
+/// A hit in the units of a proxy's grid.
+struct ProxyHit {
+  double t;
+  VoxelIndex voxel{};
+  DVec3 normal; ///< towards the ray's origin
+};
+
+std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction, double t_min, double t_max) {
+  if (proxy.is_field()) {
+    const double length = glm::length(direction);
+    const FieldTracer tracer(proxy.field, (proxy.record.flags & voxels::kSigned) != 0);
+    const auto hit = tracer.first_hit(glm::vec3(origin), glm::vec3(direction / length),
+                                      static_cast<float>(t_min * length), static_cast<float>(t_max * length));
+    if (!hit || !(double{hit->t} / length < t_max)) return std::nullopt;
+    return ProxyHit{double{hit->t} / length, {}, DVec3(hit->normal)};
+  }
+  const auto hit = VoxelTracer(proxy.voxels).first_hit(origin, direction, t_min, t_max);
+  if (!hit) return std::nullopt;
+  DVec3 normal(0.0);
+  const int axis = std::max(hit->axis, 0);
+  normal[axis] = direction[axis] > 0.0 ? -1.0 : 1.0;
+  return ProxyHit{hit->t, hit->voxel, normal};
 }
 
 } // namespace
@@ -56,37 +81,48 @@ VoxelScene::VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)
 }
 
 std::optional<SceneVoxelHit> VoxelScene::first_hit(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
-  std::optional<VoxelHit<double>> best;
-  const Placed* from = nullptr;
+  std::optional<ProxyHit> best;
+  uint32_t best_thing = 0;
   tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
     const Placed& placed = placed_[thing];
-    const auto hit = VoxelTracer(proxies_[placed.proxy].voxels)
-                         .first_hit(transform_point(placed.grid_from_world, origin),
-                                    transform_vector(placed.grid_from_world, direction), t_min, limit);
-    if (!hit || (best && !(hit->t < best->t || (hit->t == best->t && placed.instance < from->instance)))) return limit;
-    best = hit, from = &placed;
-    return hit->t > t_min ? std::nextafter(hit->t, limit + 1.0) : hit->t;
+    const auto hit = hit_of(proxies_[placed.proxy], transform_point(placed.grid_from_world, origin),
+                            transform_vector(placed.grid_from_world, direction), t_min, limit);
+    if (!hit || (best && !(hit->t < best->t || (hit->t == best->t && thing < best_thing)))) return limit;
+    best = hit, best_thing = thing;
+    return hit->t > t_min ? std::nextafter(hit->t, limit + 1.0) : hit->t; // of equal ones the first instance counts
   });
   if (!best) return std::nullopt;
+  const Placed& from = placed_[best_thing];
+  const Proxy& proxy = proxies_[from.proxy];
   SceneVoxelHit result;
-  result.t = best->t, result.instance = from->instance, result.voxel = best->voxel;
-  const Proxy& proxy = proxies_[from->proxy];
-  DVec3 normal(0.0);
-  normal[std::max(best->axis, 0)] =
-      transform_vector(from->grid_from_world, direction)[std::max(best->axis, 0)] > 0.0 ? -1.0 : 1.0;
-  result.normal = glm::normalize(from->world_normal * normal);
-  result.edge = 1.0 / glm::length(glm::transpose(glm::dmat3(from->grid_from_world)) * normal);
+  result.t = best->t, result.instance = from.instance, result.voxel = best->voxel, result.placed = best_thing,
+  result.is_field = proxy.is_field();
+  result.normal = glm::normalize(from.world_normal * best->normal);
+  result.edge = 1.0 / glm::length(glm::transpose(glm::dmat3(from.grid_from_world)) * best->normal);
   if (!proxy.palette.empty()) result.albedo = linear_color(proxy.palette[proxy.voxels.swatch(best->voxel)]);
   return result;
+}
+
+std::optional<FieldVisibility> VoxelScene::field_visibility(const SceneVoxelHit& hit, DVec3 point,
+                                                            double radius) const {
+  const Placed& placed = placed_[hit.placed];
+  const Proxy& proxy = proxies_[placed.proxy];
+  if (!proxy.is_field()) return std::nullopt;
+  const FieldTracer tracer(proxy.field, (proxy.record.flags & voxels::kSigned) != 0);
+  const glm::vec3 p(transform_point(placed.grid_from_world, point));
+  // The normal of the grid is the world's under the transposed map.
+  const glm::vec3 normal(glm::normalize(glm::transpose(glm::inverse(glm::dmat3(placed.grid_from_world))) * hit.normal));
+  const auto reach = static_cast<float>(radius / hit.edge);
+  return FieldVisibility{tracer.tap_visibility(p, normal, reach), tracer.cone_visibility(p, normal, reach)};
 }
 
 bool VoxelScene::occluded(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
   bool hit = false;
   tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
     const Placed& placed = placed_[thing];
-    hit = VoxelTracer(proxies_[placed.proxy].voxels)
-              .occluded(transform_point(placed.grid_from_world, origin),
-                        transform_vector(placed.grid_from_world, direction), t_min, limit);
+    hit = hit_of(proxies_[placed.proxy], transform_point(placed.grid_from_world, origin),
+                 transform_vector(placed.grid_from_world, direction), t_min, limit)
+              .has_value();
     return hit ? t_min : limit;
   });
   return hit;
@@ -97,14 +133,15 @@ double VoxelScene::first_distance(DVec3 origin, DVec3 direction, double t_min, d
   double nearest = t_max;
   tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
     const Placed& placed = placed_[thing];
-    const OccupancyStream& stream = proxies_[placed.proxy].voxels;
+    const Proxy& proxy = proxies_[placed.proxy];
+    const VoxelIndex size = proxy.frame().size;
     const DVec3 o = transform_point(placed.grid_from_world, origin),
                 d = transform_vector(placed.grid_from_world, direction);
     bool inside = true;
-    for (int a = 0; a < 3; ++a) inside &= o[a] > -kMargin && o[a] < stream.size()[static_cast<size_t>(a)] + kMargin;
+    for (int a = 0; a < 3; ++a) inside &= o[a] > -kMargin && o[a] < size[static_cast<size_t>(a)] + kMargin;
     const double begin = inside ? std::max(t_min, kDiagonal / glm::length(d)) : t_min;
     if (!(begin < limit)) return limit;
-    if (const auto hit = VoxelTracer(stream).first_hit(o, d, begin, limit)) nearest = hit->t;
+    if (const auto hit = hit_of(proxy, o, d, begin, limit)) nearest = hit->t;
     return nearest;
   });
   return nearest;
@@ -112,7 +149,8 @@ double VoxelScene::first_distance(DVec3 origin, DVec3 direction, double t_min, d
 
 uint64_t VoxelScene::resident_bytes() const {
   uint64_t bytes = placed_.size() * sizeof(Placed) + tree_.bytes();
-  for (const Proxy& proxy : proxies_) bytes += sizeof(Proxy) + 4 * (proxy.voxels.words().size() + proxy.palette.size());
+  for (const Proxy& proxy : proxies_)
+    bytes += sizeof(Proxy) + 4 * (proxy.voxels.words().size() + proxy.field.words().size() + proxy.palette.size());
   return bytes;
 }
 

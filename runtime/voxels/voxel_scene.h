@@ -16,16 +16,26 @@ struct SceneVoxelHit {
   double t = 0.0;
   uint32_t instance = 0;
   VoxelIndex voxel{};
-  DVec3 normal{0.0}; ///< unit, world space, of the face that the ray enters through, towards the ray's origin
-  double edge = 0.0; ///< length of a voxel along the normal, world units
+  DVec3 normal{0.0};   ///< unit, world space, of the face that the ray enters through, towards the ray's origin
+  uint32_t placed = 0; ///< number among the scene's instances
+  double edge = 0.0;   ///< length of a voxel along the normal, world units
+  bool is_field = false;
   Vec3 albedo{0.8f}; ///< linear; of the voxel's swatch if it has one
 };
 
-/// The instances of a file as voxels, in the coordinates of the file (relative to BakedFile::origin()).
+/// Ambient occlusion of a distance field without rays, see FieldTracer.
+struct FieldVisibility {
+  float taps, cones;
+};
+
+/// The instances of a file as voxels or distance fields, in the coordinates of the file (relative to
+/// BakedFile::origin()).
 class VoxelScene {
 public:
   /// @param wanted whether an instance takes part; called for those that have a proxy
   explicit VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)>& wanted = {});
+  VoxelScene(const VoxelScene&) = delete;
+  VoxelScene& operator=(const VoxelScene&) = delete;
 
   /// The first voxel in [t_min, t_max).
   std::optional<SceneVoxelHit> first_hit(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
@@ -34,6 +44,11 @@ public:
   /// For rays from surfaces that the voxels stand for: like first_hit(), but an instance's voxels do not count within a
   /// voxel's diagonal of the origin if that lies in the instance's grid. Returns t, or t_max without a hit.
   double first_distance(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
+
+  /// Visibility of a hit of a distance field by taps along its normal and by cones; none for voxels.
+  /// @param point of the hit, in the file's coordinates
+  /// @param radius world units
+  std::optional<FieldVisibility> field_visibility(const SceneVoxelHit& hit, DVec3 point, double radius) const;
 
   size_t instance_count() const { return placed_.size(); }
   /// Instances with a proxy that a transform flattens to a plane, a line or a point; they are not traced.

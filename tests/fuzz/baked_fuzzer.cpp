@@ -190,7 +190,12 @@ void read_proxies_of(const BakedFile& file) {
   if (bytes.empty()) return;
   for (const Proxy& proxy : read_proxies(bytes)) {
     require(proxy.record.geometry < file.geometries().size(), "geometry of a proxy");
-    const VoxelIndex size = proxy.voxels.size();
+    const VoxelIndex size = proxy.frame().size;
+    if (proxy.is_field()) {
+      for (float at = -1.0f; at < static_cast<float>(size[0] + 2); at += 0.7f)
+        require(std::isfinite(proxy.field.distance({at, 0.5f * at, 1.5f * at})), "distance");
+      continue;
+    }
     constexpr uint32_t kSteps = 12;
     for (uint32_t i = 0; i < kSteps * kSteps * kSteps; ++i) {
       const auto at = [&](uint32_t step, uint32_t count) { return step * (count - 1) / (kSteps - 1); };

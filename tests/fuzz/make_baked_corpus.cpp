@@ -91,6 +91,10 @@ private:
     config.proxy.materials = false, config.proxy.dag = true, config.proxy.fill = true;
     config.codec = PageCodec::kSmall;
     write(config, "dag");
+    config.proxy = {};
+    config.proxy.use = ProxyUse::kField;
+    config.proxy.voxels = 5;
+    write(config, "sdf");
   }
 
   /// Moves the first mesh of the scene.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "compress/bake/proxies/geometry_field.h"
 #include "compress/bake/proxies/geometry_voxels.h"
 #include "compress/bake/proxies/occluding_triangles.h"
 #include "compress/format/deformation/deformation_view.h"
@@ -67,6 +68,32 @@ Proxy build_voxels(const BakedFile& file, uint32_t geometry, std::span<const uin
   return proxy;
 }
 
+/// Errors of a field are those of its quantisation: its distances are exact.
+Proxy build_distances(const BakedFile& file, uint32_t geometry, const OccludingTriangles& source,
+                      const ProxyConfig& config, const MemoryBudget& budget) {
+  const std::string name(file.text(file.geometries()[geometry].name));
+  GeometryField built = build_field(source, config, budget, name);
+  Proxy proxy;
+  proxy.field = std::move(built.field);
+  const double error = proxy.field.quantum() * built.edge;
+  proxy.record = {geometry,
+                  voxels::kFieldProxy,
+                  (source.closed ? voxels::kClosedSource : 0) | (built.has_sign ? voxels::kSigned : 0),
+                  0,
+                  {built.origin.x, built.origin.y, built.origin.z},
+                  built.edge,
+                  error,
+                  error,
+                  0};
+  return proxy;
+}
+
+Proxy build_any(const BakedFile& file, uint32_t geometry, std::span<const uint32_t> runs,
+                const OccludingTriangles& source, const ProxyConfig& config, const MemoryBudget& budget) {
+  return config.use == ProxyUse::kField ? build_distances(file, geometry, source, config, budget)
+                                        : build_voxels(file, geometry, runs, source, config, budget);
+}
+
 } // namespace
 
 std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& config, const MemoryBudget& budget,
@@ -89,7 +116,7 @@ std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& confi
       continue;
     }
     open += config.fill && !source.closed;
-    proxies.push_back(build_voxels(file, g, runs[g], source, config, budget));
+    proxies.push_back(build_any(file, g, runs[g], source, config, budget));
   }
   if (open > 0)
     warn(std::to_string(open) + " of " + std::to_string(proxies.size()) +
@@ -106,7 +133,7 @@ std::optional<Proxy> build_proxy(const BakedFile& file, uint32_t geometry, const
   if (runs.empty()) return std::nullopt;
   const OccludingTriangles source = occluding_triangles(file, geometry, runs);
   if (source.triangles.empty()) return std::nullopt;
-  return build_voxels(file, geometry, runs, source, config, budget);
+  return build_any(file, geometry, runs, source, config, budget);
 }
 
 std::vector<std::byte> with_proxies(const BakedFile& file, std::span<const Proxy> proxies) {

@@ -8,7 +8,7 @@ namespace {
 template <class Value, class Print>
 std::string array_text(const char* type, const std::string& name, std::span<const Value> values, const Print& print) {
   const std::string count = std::to_string(values.size());
-  std::string text = std::string("const ") + type + " " + name + "[" + count + "] = " + type + "[" + count + "](";
+  std::string text = std::string("ARRAY ") + type + " " + name + "[" + count + "] = " + type + "[" + count + "](";
   for (size_t i = 0; i < values.size(); ++i) {
     if (i > 0) text += ",";
     if (i % 8 == 0) text += "\n  ";
@@ -44,11 +44,11 @@ std::string glsl_ints(const std::string& name, std::span<const int32_t> values) 
 }
 
 std::string glsl_begin(ShaderForm form) {
-  if (form == ShaderForm::kShadertoy) return "#define EXACT\n\n";
+  if (form == ShaderForm::kShadertoy) return "#define EXACT\n#define ARRAY const\n\n";
   return "#version 450\n"
          "layout(location = 0) out vec4 out_color;\n"
          "layout(push_constant) uniform Push { vec2 resolution; } push; // pixels\n"
-         "#define EXACT precise\n\n";
+         "#define EXACT precise\n#define ARRAY\n\n";
 }
 
 std::string glsl_end(ShaderForm form) {

@@ -27,9 +27,10 @@ struct ShaderConfig {
 /// A float as GLSL reads it back to the same bits.
 std::string glsl_float(float value);
 std::string glsl_vec3(Vec3 value);
-/// "const uint NAME[COUNT] = uint[COUNT](...);" and a newline.
+/// "ARRAY uint NAME[COUNT] = uint[COUNT](...);" and a newline. ARRAY is const in Shadertoy's form only: compilers to
+/// SPIR-V copy a constant array for each access with a variable index.
 std::string glsl_words(const std::string& name, std::span<const uint32_t> words);
-/// "const int NAME[COUNT] = int[COUNT](...);" and a newline.
+/// "ARRAY int NAME[COUNT] = int[COUNT](...);" and a newline.
 std::string glsl_ints(const std::string& name, std::span<const int32_t> values);
 
 /// What comes before and after the functions of a form. The functions define vec3 picture(vec2 pixel, vec2 resolution),

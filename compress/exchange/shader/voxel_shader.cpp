@@ -185,7 +185,7 @@ float linear_of(uint32_t byte) {
 std::string palette_text(const Proxy& proxy, const ShaderView& view) {
   if (proxy.palette.empty()) return "vec3 color_of(int leaf) { return " + glsl_vec3(view.albedo) + "; }\n";
   const std::string count = std::to_string(proxy.palette.size());
-  std::string text = "const vec3 PALETTE[" + count + "] = vec3[" + count + "](";
+  std::string text = "ARRAY vec3 PALETTE[" + count + "] = vec3[" + count + "](";
   for (size_t i = 0; i < proxy.palette.size(); ++i) {
     const uint32_t c = proxy.palette[i];
     text += (i > 0 ? ",\n  " : "\n  ") +
@@ -215,7 +215,7 @@ std::string constants_text(const Proxy& proxy, const ShaderView& view) {
   text += "const vec3 EYE = " + glsl_vec3(view.eye) + ", FORWARD = " + glsl_vec3(view.forward) +
           ",\n  RIGHT = " + glsl_vec3(view.right) + ", UP = " + glsl_vec3(view.up) +
           ",\n  BACKGROUND = " + glsl_vec3(view.background) +
-          ";\nconst float AO_RADIUS = " + glsl_float(view.ao_radius) + ";\nconst vec3 DIRECTIONS[16] = vec3[16](";
+          ";\nconst float AO_RADIUS = " + glsl_float(view.ao_radius) + ";\nARRAY vec3 DIRECTIONS[16] = vec3[16](";
   for (size_t i = 0; i < view.directions.size(); ++i)
     text += (i > 0 ? ",\n  " : "\n  ") + glsl_vec3(view.directions[i]);
   return text + ");\n";

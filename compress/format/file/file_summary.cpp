@@ -156,6 +156,12 @@ std::vector<ProxySummary> summarize_proxies(const BakedFile& file) {
   if (bytes.empty()) return result;
   for (const Proxy& proxy : read_proxies(bytes)) {
     const voxels::ProxyRecord& r = proxy.record;
+    if (proxy.is_field()) {
+      result.push_back({std::string(file.text(file.geometries()[r.geometry].name)), r.kind, r.flags, 0,
+                        proxy.field.size(), r.edge, r.surface_error, r.voxel_error,
+                        uint64_t{proxy.field.header().stored_bricks} * voxels::kBrickSamples, proxy.field.bits(), 0});
+      continue;
+    }
     result.push_back({std::string(file.text(file.geometries()[r.geometry].name)), r.kind, r.flags, r.palette_count,
                       proxy.voxels.size(), r.edge, r.surface_error, r.voxel_error, proxy.voxels.stored_voxels(),
                       proxy.voxels.bits(), proxy.voxels.index_bits()});

@@ -99,7 +99,8 @@ struct ProxySummary {
   uint32_t kind = 0, flags = 0, swatches = 0;
   VoxelIndex size{};
   double edge = 0.0, surface_error = 0.0, voxel_error = 0.0;
-  uint64_t stored_voxels = 0, bits = 0, index_bits = 0; ///< without the header
+  uint64_t stored_voxels = 0;        ///< of a field: samples
+  uint64_t bits = 0, index_bits = 0; ///< without the header
 };
 
 struct FileSummary {

@@ -16,6 +16,7 @@ void append_bytes(std::vector<uint8_t>& bytes, const T* first, size_t count) {
 }
 
 uint64_t data_bytes(const Proxy& proxy) {
+  if (proxy.is_field()) return sizeof(FieldHeader) + 4 * proxy.field.words().size();
   return sizeof(OccupancyHeader) + 4 * (proxy.voxels.words().size() + proxy.palette.size());
 }
 
@@ -71,6 +72,18 @@ std::optional<std::string_view> take_voxels(StreamReader& reader, const ProxyRec
   return std::nullopt;
 }
 
+std::optional<std::string_view> take_field(StreamReader& reader, const ProxyRecord& record, Proxy& proxy) {
+  FieldHeader header{};
+  std::vector<uint32_t> words;
+  if (!reader.take(&header, 1)) return "it ends in a header";
+  if (record.palette_count != 0) return "palette of a field";
+  if (!reader.take(words, header.word_count)) return "it ends in the words";
+  if (const auto fault = find_field_fault(header, words)) return fault;
+  proxy.record = record;
+  proxy.field = DistanceField(header, std::move(words));
+  return std::nullopt;
+}
+
 /// Reads a stream and passes each proxy on: visit(Proxy&&).
 template <class Visit>
 std::optional<std::string_view> read_stream(std::span<const uint8_t> stream, uint64_t geometry_count,
@@ -86,7 +99,9 @@ std::optional<std::string_view> read_stream(std::span<const uint8_t> stream, uin
     if (i > 0 && records[i].geometry <= records[i - 1].geometry) return "order of geometries";
     const size_t before = reader.rest().size();
     Proxy proxy;
-    if (const auto fault = take_voxels(reader, records[i], proxy)) return fault;
+    if (const auto fault = records[i].kind == kFieldProxy ? take_field(reader, records[i], proxy)
+                                                          : take_voxels(reader, records[i], proxy))
+      return fault;
     if (before - reader.rest().size() != records[i].data_bytes) return "size of the data";
     visit(std::move(proxy));
   }
@@ -107,6 +122,11 @@ std::vector<uint8_t> encode_proxies(std::span<const Proxy> proxies) {
     append_bytes(bytes, &record, 1);
   }
   for (const Proxy& proxy : proxies) {
+    if (proxy.is_field()) {
+      append_bytes(bytes, &proxy.field.header(), 1);
+      append_bytes(bytes, proxy.field.words().data(), proxy.field.words().size());
+      continue;
+    }
     append_bytes(bytes, &proxy.voxels.header(), 1);
     append_bytes(bytes, proxy.voxels.words().data(), proxy.voxels.words().size());
     append_bytes(bytes, proxy.palette.data(), proxy.palette.size());

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "compress/format/voxels/distance_field.h"
 #include "compress/format/voxels/occupancy_stream.h"
 #include "compress/format/voxels/proxy_format.h"
 
@@ -17,8 +18,14 @@ struct Proxy {
   OccupancyStream voxels;        ///< kVoxelProxy
   std::vector<uint32_t> palette; ///< red in the lowest byte
 
+  DistanceField field; ///< kFieldProxy
+
+  bool is_field() const { return record.kind == packtrace::voxels::kFieldProxy; }
+  /// Voxels, or the cells between the samples of a field.
   VoxelFrame frame() const {
-    return {DVec3(record.origin[0], record.origin[1], record.origin[2]), record.edge, voxels.size()};
+    VoxelIndex size = is_field() ? field.size() : voxels.size();
+    for (uint32_t& n : size) n -= is_field() ? 1 : 0;
+    return {DVec3(record.origin[0], record.origin[1], record.origin[2]), record.edge, size};
   }
 };
 
