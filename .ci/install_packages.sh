@@ -21,7 +21,7 @@ for argument in "$@"; do
         xvfb xdotool libgl1-mesa-dri # the viewer in a window: a display, keys and mouse, OpenGL in software
         dpkg-dev file # Debian packages of packtrace itself
       ) ;;
-    benchmarks) packages+=(libbenchmark-dev libopenmesh-dev libtinygltf-dev) ;; # what packtrace is compared with
+    benchmarks) packages+=(libbenchmark-dev libopenmesh-dev libtinygltf-dev libnanovdb-dev libopenvdb-dev libboost-dev) ;; # what packtrace is compared with
     interop) # the caller's Node.js, or Debian's
       command -v npm >/dev/null || packages+=(nodejs npm)
       packages+=(chromium) ;;

@@ -62,7 +62,7 @@ ProxyConfig make_proxy_config(const ProxyOptions& options) {
   if (config.voxels < 1 || config.voxels > kMaxGridSize)
     throw Error(ErrorKind::kUsage,
                 "--proxy-voxels must be 1 to " + std::to_string(kMaxGridSize) + ", the largest grid");
-  if (options.rule == kThinName) config.rule = VoxelRule::kThin;
+  if (options.rule == kThinName) config.rule = VoxelRule::kSeparating;
   config.fill = options.fill, config.dag = options.dag, config.materials = options.materials;
   if (config.dag && config.materials)
     throw Error(ErrorKind::kUsage, "--proxy-dag and --proxy-materials exclude each other: equal parts of the tree may "

@@ -44,7 +44,7 @@ TEST(Proxies, ErrorsOfConservativeVoxelsStayWithinHalfADiagonal) {
 
 TEST(Proxies, StatedErrorsHoldForAnIndependentSample) {
   BakeConfig config = proxy_config(30);
-  for (const VoxelRule rule : {VoxelRule::kConservative, VoxelRule::kThin}) {
+  for (const VoxelRule rule : {VoxelRule::kConservative, VoxelRule::kSeparating}) {
     config.proxy.rule = rule;
     const BakedScene baked = test::bake(test::scene_of(test::sphere_mesh(60)), config);
     const Proxy proxy = proxies_of(baked).at(0);

@@ -82,7 +82,7 @@ TEST(TriangleVoxels, LargeCoordinatesDoNotOverflow) {
     FineTriangle large = small;
     for (FinePoint& p : large)
       for (int64_t& c : p) c *= kScale;
-    for (const VoxelRule rule : {VoxelRule::kConservative, VoxelRule::kThin})
+    for (const VoxelRule rule : {VoxelRule::kConservative, VoxelRule::kSeparating})
       ASSERT_TRUE(voxels_of({small}, 8, {7, 7, 7}, rule) == voxels_of({large}, kEdge, {7, 7, 7}, rule));
   }
 }
@@ -111,7 +111,7 @@ TEST(TriangleVoxels, ThinVoxelsSeparateInsideFromOutside) {
   constexpr int64_t kEdge = 1000;
   const VoxelIndex size = {40, 40, 40};
   const std::vector<FineTriangle> triangles = ball({20123, 19877, 20345}, 15000);
-  const VoxelSet thin = voxels_of(triangles, kEdge, size, VoxelRule::kThin),
+  const VoxelSet thin = voxels_of(triangles, kEdge, size, VoxelRule::kSeparating),
                  all = voxels_of(triangles, kEdge, size, VoxelRule::kConservative);
   EXPECT_LT(thin.count() * 10, all.count() * 8);
   thin.for_each([&](VoxelIndex v) { ASSERT_TRUE(all.test(v)); });

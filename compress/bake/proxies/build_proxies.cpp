@@ -58,7 +58,7 @@ Proxy build_voxels(const BakedFile& file, uint32_t geometry, std::span<const uin
   proxy.record = {geometry,
                   voxels::kVoxelProxy,
                   (source.closed ? voxels::kClosedSource : 0) | (voxels.filled ? voxels::kFilled : 0) |
-                      (config.rule == VoxelRule::kThin ? voxels::kThin : 0),
+                      (config.rule == VoxelRule::kSeparating ? voxels::kThin : 0),
                   0,
                   {origin.x, origin.y, origin.z},
                   voxels.frame.edge,

@@ -58,7 +58,7 @@ void TriangleVoxels::add_axis(const std::array<Wide, 3>& direction, const FineTr
   Wide sum = 0, reach = 0;
   for (const Wide d : direction) {
     sum += d;
-    reach = rule == VoxelRule::kThin ? std::max(reach, magnitude(d)) : reach + magnitude(d);
+    reach = rule == VoxelRule::kSeparating ? std::max(reach, magnitude(d)) : reach + magnitude(d);
   }
   if (reach == 0) return;
   // Twice the centre's place along the direction is 2 edge direction . (x, y, z) + edge sum; it may differ from twice
