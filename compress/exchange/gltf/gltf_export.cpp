@@ -35,7 +35,7 @@ public:
     std::vector<bool> merged = merge_world(meshes);
     for (uint32_t g = 0; g < encoded_.size(); ++g) {
       if (config_.codec == GltfCodec::kDraco)
-        for (const EncodedPrimitive& primitive : encoded_[g].primitives)
+        for (const GltfPrimitive& primitive : encoded_[g].primitives)
           result_.report.plain_primitives += !primitive.draco;
       meshes.add_geometry(g, std::move(encoded_[g]));
     }
@@ -95,7 +95,7 @@ private:
     progress_.begin("compressing", encoded_.size());
     tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(encoded_.size()), [&](uint32_t g) {
       const DracoGrid grid = grids.grid(file_.geometries()[g], g);
-      for (EncodedPrimitive& primitive : encoded_[g].primitives) {
+      for (GltfPrimitive& primitive : encoded_[g].primitives) {
         progress_.check_cancelled();
         if (grid.bits <= kMaxDracoBits) primitive.draco = encode_draco(primitive.plain, grid, config_.draco);
       }
@@ -121,7 +121,7 @@ private:
     std::vector<std::vector<uint32_t>> users(file_.geometries().size());
     for (uint32_t i = 0; i < file_.instances().size(); ++i) users[file_.instances()[i].geometry].push_back(i);
     for (uint32_t g = 0; g < file_.base_geometry_count(); ++g) // levels of detail keep theirs
-      for (EncodedPrimitive& primitive : encoded_[g].primitives) {
+      for (GltfPrimitive& primitive : encoded_[g].primitives) {
         std::vector<Vec2>& uvs = primitive.plain.uvs;
         if (!encoded_[g].with_uvs || uvs.empty()) continue;
         glm::dvec2 lo(uvs.front());
@@ -139,8 +139,8 @@ private:
   /// remain if that takes more than 16 bits.
   void choose_uv_grid() {
     glm::dvec2 lo(std::numeric_limits<double>::infinity()), hi = -lo;
-    for (const EncodedGeometry& geometry : encoded_)
-      for (const EncodedPrimitive& primitive : geometry.primitives)
+    for (const GltfGeometry& geometry : encoded_)
+      for (const GltfPrimitive& primitive : geometry.primitives)
         if (geometry.with_uvs)
           for (const Vec2& uv : primitive.plain.uvs)
             lo = glm::min(lo, glm::dvec2(uv)), hi = glm::max(hi, glm::dvec2(uv));
@@ -196,7 +196,7 @@ private:
   GltfExport result_;
   UvGrid uvs_;
   std::vector<uint32_t> uses_; ///< instances by geometry
-  std::vector<EncodedGeometry> encoded_;
+  std::vector<GltfGeometry> encoded_;
 };
 
 } // namespace

@@ -31,7 +31,7 @@ double lattice_step(const baked::GeometryRecord& geometry) {
   return PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step();
 }
 
-void LatticeBox::extend(const LatticePoint& p) {
+void GltfLatticeBox::extend(const LatticePoint& p) {
   for (size_t axis = 0; axis < 3; ++axis) {
     lo[axis] = empty ? p[axis] : std::min(lo[axis], p[axis]);
     hi[axis] = empty ? p[axis] : std::max(hi[axis], p[axis]);
@@ -39,24 +39,24 @@ void LatticeBox::extend(const LatticePoint& p) {
   empty = false;
 }
 
-void LatticeBox::extend(const LatticeBox& box) {
+void GltfLatticeBox::extend(const GltfLatticeBox& box) {
   if (box.empty) return;
   extend(box.lo);
   extend(box.hi);
 }
 
-int LatticeBox::bits() const {
+int GltfLatticeBox::bits() const {
   uint64_t extent = 1;
   for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, static_cast<uint64_t>(hi[axis] - lo[axis]));
   return static_cast<int>(std::bit_width(extent));
 }
 
-void DracoGrids::add(const baked::GeometryRecord& geometry, uint32_t number, const LatticeBox& box) {
+void DracoGrids::add(const baked::GeometryRecord& geometry, uint32_t number, const GltfLatticeBox& box) {
   boxes_[key(geometry, number)].extend(box);
 }
 
 DracoGrid DracoGrids::grid(const baked::GeometryRecord& geometry, uint32_t number) const {
-  const LatticeBox& box = boxes_.at(key(geometry, number));
+  const GltfLatticeBox& box = boxes_.at(key(geometry, number));
   return {box.lo, lattice_step(geometry), box.bits()};
 }
 
@@ -64,10 +64,10 @@ DracoGrids::Key DracoGrids::key(const baked::GeometryRecord& geometry, uint32_t 
   return {lattice_step(geometry), (geometry.flags & baked::kWorldSpace) != 0 ? baked::kNone : number};
 }
 
-void GltfMeshes::add_geometry(uint32_t geometry, EncodedGeometry&& from) {
+void GltfMeshes::add_geometry(uint32_t geometry, GltfGeometry&& from) {
   if (templates_.size() <= geometry) templates_.resize(geometry + 1), frames_.resize(geometry + 1, DAffine(1.0));
   if (config_.codec == GltfCodec::kMeshopt) return add_meshopt(geometry, std::move(from));
-  for (EncodedPrimitive& primitive : from.primitives) {
+  for (GltfPrimitive& primitive : from.primitives) {
     if (!from.with_uvs && !primitive.draco) primitive.plain.uvs.clear();
     templates_[geometry].push_back(primitive.draco ? add_draco(primitive) : add_plain(std::move(primitive.plain)));
     primitive = {};
@@ -93,7 +93,7 @@ GltfMeshes::Template GltfMeshes::add_plain(PlainPrimitive&& plain) {
   return made;
 }
 
-GltfMeshes::Template GltfMeshes::add_draco(const EncodedPrimitive& from) {
+GltfMeshes::Template GltfMeshes::add_draco(const GltfPrimitive& from) {
   const PlainPrimitive& plain = from.plain;
   const DracoPrimitive& draco = *from.draco;
   Template made{plain.material_slot, {}, {}, false};
@@ -133,10 +133,10 @@ GltfJson GltfMeshes::add_coded(const PlainPrimitive& plain, const PositionFrame&
 }
 
 /// Adds a geometry whose positions are integers; those whose lattice is too fine stay floats.
-void GltfMeshes::add_meshopt(uint32_t geometry, EncodedGeometry&& from) {
+void GltfMeshes::add_meshopt(uint32_t geometry, GltfGeometry&& from) {
   const baked::GeometryRecord& record = file_.geometries()[geometry];
   const std::optional<PositionFrame> frame = from.box.empty ? std::nullopt : position_frame(from.box.lo, from.box.hi);
-  for (EncodedPrimitive& primitive : from.primitives) {
+  for (GltfPrimitive& primitive : from.primitives) {
     if (!frame) {
       ++report_.plain_primitives;
       if (!from.with_uvs) primitive.plain.uvs.clear();
@@ -229,17 +229,17 @@ void GltfMeshes::add_world(std::vector<Placed>&& geometries) {
   std::map<Key, std::vector<Batch>> batches;
   for (Placed& placed : geometries) {
     const double step = lattice_step(file_.geometries()[placed.geometry]);
-    for (EncodedPrimitive& primitive : placed.encoded->primitives) {
+    for (GltfPrimitive& primitive : placed.encoded->primitives) {
       PlainPrimitive& plain = primitive.plain;
       const uint32_t material = file_.sections().material_slots[placed.first_slot + plain.material_slot];
       if (!materials_.has_image(material)) plain.uvs.clear();
-      LatticeBox box;
+      GltfLatticeBox box;
       for (const LatticePoint& p : plain.lattice) box.extend(p);
       std::vector<Batch>& open =
           batches[{step, materials_.number(material), !plain.normals.empty(), !plain.uvs.empty()}];
       constexpr int kShortBits = 16;
       const auto fits = [&](const Batch& batch) {
-        LatticeBox both = batch.box;
+        GltfLatticeBox both = batch.box;
         both.extend(box);
         return both.bits() <= std::max({kShortBits, box.bits(), batch.box.bits()});
       };

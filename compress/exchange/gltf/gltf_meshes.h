@@ -18,25 +18,25 @@ namespace packtrace {
 double lattice_step(const baked::GeometryRecord& geometry);
 
 /// Bounds on a lattice.
-struct LatticeBox {
+struct GltfLatticeBox {
   LatticePoint lo{}, hi{};
   bool empty = true;
   void extend(const LatticePoint& p);
-  void extend(const LatticeBox& box);
+  void extend(const GltfLatticeBox& box);
   /// Bits per axis for codes that count from lo, at least 1.
   int bits() const;
 };
 
 /// A primitive, encoded but not yet added to the model.
-struct EncodedPrimitive {
+struct GltfPrimitive {
   PlainPrimitive plain;
   std::optional<DracoPrimitive> draco;
 };
 
 /// The primitives of a geometry, and what they need to be stored.
-struct EncodedGeometry {
-  std::vector<EncodedPrimitive> primitives;
-  LatticeBox box;
+struct GltfGeometry {
+  std::vector<GltfPrimitive> primitives;
+  GltfLatticeBox box;
   bool with_uvs = true; ///< some instance has a material with an image
 };
 
@@ -44,13 +44,13 @@ struct EncodedGeometry {
 /// touching surfaces decode to equal positions.
 class DracoGrids {
 public:
-  void add(const baked::GeometryRecord& geometry, uint32_t number, const LatticeBox& box);
+  void add(const baked::GeometryRecord& geometry, uint32_t number, const GltfLatticeBox& box);
   DracoGrid grid(const baked::GeometryRecord& geometry, uint32_t number) const;
 
 private:
   using Key = std::pair<double, uint32_t>;
   static Key key(const baked::GeometryRecord& geometry, uint32_t number);
-  std::map<Key, LatticeBox> boxes_;
+  std::map<Key, GltfLatticeBox> boxes_;
 };
 
 /// Adds geometries to a model as glTF meshes.
@@ -61,7 +61,7 @@ public:
       : file_(file), config_(config), materials_(materials), uvs_(uvs), model_(model), streams_(model),
         report_(report) {}
 
-  void add_geometry(uint32_t geometry, EncodedGeometry&& from);
+  void add_geometry(uint32_t geometry, GltfGeometry&& from);
   /// Returns the mesh of a geometry with the materials of an instance; meshes of one geometry share its buffers. None
   /// if the geometry has no triangles.
   std::optional<int> mesh_of(uint32_t geometry, uint32_t first_slot);
@@ -72,7 +72,7 @@ public:
   /// @param geometries each of one instance at the identity
   struct Placed {
     uint32_t geometry, first_slot;
-    EncodedGeometry* encoded;
+    GltfGeometry* encoded;
   };
   void add_world(std::vector<Placed>&& geometries);
 
@@ -91,12 +91,12 @@ private:
   };
   struct Batch {
     PlainPrimitive plain;
-    LatticeBox box;
+    GltfLatticeBox box;
   };
 
   Template add_plain(PlainPrimitive&& plain);
-  Template add_draco(const EncodedPrimitive& from);
-  void add_meshopt(uint32_t geometry, EncodedGeometry&& from);
+  Template add_draco(const GltfPrimitive& from);
+  void add_meshopt(uint32_t geometry, GltfGeometry&& from);
   void add_batch(const Batch& batch, double step, int material);
   GltfJson add_coded(const PlainPrimitive& plain, const PositionFrame& frame, bool with_uvs);
   int add_floats(std::span<const float> values, const char* type);
