@@ -36,7 +36,7 @@ std::optional<FieldHit> FieldTracer::first_hit(glm::vec3 origin, glm::vec3 direc
     const glm::vec3 p = origin + t * direction;
     const float signed_distance = field_->distance(p),
                 distance = has_sign_ ? signed_distance : std::abs(signed_distance);
-    if (distance < kSurface) {
+    if (distance < (has_sign_ ? kSurface : kUnsignedSurface)) {
       glm::vec3 normal = gradient(p);
       if (glm::dot(normal, direction) > 0.0f) normal = -normal;
       return FieldHit{t, normal};

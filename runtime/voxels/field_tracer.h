@@ -21,7 +21,8 @@ public:
   /// @param has_sign whether distances inside are negative
   FieldTracer(const DistanceField& field, bool has_sign) : field_(&field), has_sign_(has_sign) {}
 
-  /// Sphere tracing: steps as far as nothing can be near, until the distance is below kSurface.
+  /// Sphere tracing: steps as far as nothing can be near, until the distance is below kSurface, or
+  /// kUnsignedSurface without signs, where interpolated distances do not reach 0 between samples.
   /// Source: Hart, "Sphere Tracing", 1996.
   /// @param direction of unit length
   std::optional<FieldHit> first_hit(glm::vec3 origin, glm::vec3 direction, float t_min, float t_max) const;
@@ -41,7 +42,7 @@ public:
   /// Distance without sign if the field has none.
   float distance(glm::vec3 p) const { return field_->distance(p); }
 
-  static constexpr float kSurface = 0.05f; ///< voxels
+  static constexpr float kSurface = 0.05f, kUnsignedSurface = 0.6f; ///< voxels
 
 private:
   const DistanceField* field_;

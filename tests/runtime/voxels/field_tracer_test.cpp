@@ -83,6 +83,17 @@ TEST(FieldTracer, OcclusionByTapsAndConesIsNearThatOfRays) {
   EXPECT_LT(cone_error, plain_error);
 }
 
+TEST(FieldTracer, SurfacesWithoutSignsStopRays) {
+  const glm::vec3 up = glm::normalize(glm::vec3(0.3f, 1.0f, 0.2f));
+  const DistanceField field = field_of([&](glm::vec3 p) { return std::abs(glm::dot(p - 32.0f, up)); });
+  const FieldTracer tracer(field, false);
+  for (float x = 20.0f; x < 44.0f; x += 0.37f) {
+    const auto hit = tracer.first_hit({x, 60.0f, 31.3f}, {0, -1, 0}, 0.0f, 100.0f);
+    ASSERT_TRUE(hit.has_value());
+    ASSERT_NEAR(hit->t, 28.0f + (0.3f * (x - 32.0f) + 0.2f * -0.7f), 1.0f);
+  }
+}
+
 TEST(FieldTracer, AnOpenFloorIsNotOccluded) {
   const DistanceField field = field_of([](glm::vec3 p) { return p.y - 10.0f; });
   const FieldTracer tracer(field, true);
