@@ -33,7 +33,7 @@ public:
       open.pop_back();
       if (!meets(node.box, origin, inverse, t_min, t_max)) continue;
       if (node.count > 0) {
-        for (uint32_t i = 0; i < node.count; ++i) {
+        for (uint32_t i = 0; i < node.count && t_max > t_min; ++i) {
           const uint32_t thing = order_[node.first + i];
           if (meets(boxes_[thing], origin, inverse, t_min, t_max)) t_max = visit(thing, t_max);
         }
