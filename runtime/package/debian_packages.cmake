@@ -22,7 +22,7 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "${PROJECT_DESCRIPTION}: the command and the scene generator")
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-  "libtbb-dev, libglm-dev, libopenexr-dev, zlib1g-dev, libjpeg-dev, libdraco-dev, libmeshoptimizer-dev, libembree-dev (>= 3.13), libxxhash-dev, libzstd-dev, pkg-config")
+  "libtbb-dev, libglm-dev, libopenexr-dev, zlib1g-dev, libjpeg-dev, libdraco-dev, libwebp-dev, libmeshoptimizer-dev, libembree-dev (>= 3.13), libxxhash-dev, libzstd-dev, pkg-config")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "${PROJECT_DESCRIPTION}: static libraries, headers, CMake package")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= 3.11), python3 (<< 3.12), python3-numpy")

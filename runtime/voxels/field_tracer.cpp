@@ -38,6 +38,7 @@ std::optional<FieldHit> FieldTracer::first_hit(glm::vec3 origin, glm::vec3 direc
                 distance = has_sign_ ? signed_distance : std::abs(signed_distance);
     if (distance < (has_sign_ ? kSurface : kUnsignedSurface)) {
       glm::vec3 normal = gradient(p);
+      if (normal == glm::vec3(0.0f)) normal = -direction; // deep inside, where all stored distances are equal
       if (glm::dot(normal, direction) > 0.0f) normal = -normal;
       return FieldHit{t, normal};
     }
@@ -61,6 +62,8 @@ float FieldTracer::tap_visibility(glm::vec3 p, glm::vec3 normal, float radius) c
 float FieldTracer::cone_visibility(glm::vec3 p, glm::vec3 normal, float radius) const {
   // One cone along the normal and five around it share the hemisphere. The outer ones just touch an even surface.
   constexpr float kTangent = 0.5f, kKnown = static_cast<float>(voxels::kFieldBand) - 1.0f;
+  const glm::vec3 size(field_->size()[0], field_->size()[1], field_->size()[2]);
+  radius = std::min(radius, glm::length(size)); // nothing is known beyond
   float sum = 0.0f, weights = 0.0f;
   for (int cone = 0; cone < 6; ++cone) {
     const float angle = 1.2566371f * static_cast<float>(cone), sine = cone == 0 ? 0.0f : 0.8660254f;

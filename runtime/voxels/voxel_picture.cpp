@@ -42,7 +42,7 @@ VoxelPicture trace_voxel_picture(const VoxelScene& scene, const PrimaryCamera& c
       const CameraRay ray = camera.ray(x, y);
       const auto hit = scene.first_hit(ray.origin, ray.direction, 0.0, std::numeric_limits<double>::infinity());
       if (!hit) continue;
-      const DVec3 origin = ray.origin + hit->t * ray.direction + (hit->is_field ? 0.3 : 1e-3) * hit->edge * hit->normal;
+      const DVec3 origin = ray.origin + hit->t * ray.direction + hit->clearance * hit->edge * hit->normal;
       const uint32_t pixel = y * size.width + x;
       uint32_t open = 0;
       for (uint32_t s = 0; s < config.samples; ++s) {

@@ -32,12 +32,24 @@ struct ProxyHit {
 
 std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction, double t_min, double t_max) {
   if (proxy.is_field()) {
+    // The tracer's floats start where the ray enters the field, however far its origin is.
     const double length = glm::length(direction);
+    const DVec3 way = direction / length;
+    double enter = t_min * length, leave = t_max * length;
+    for (int a = 0; a < 3; ++a) {
+      const double last = proxy.field.size()[static_cast<size_t>(a)] - 1.0;
+      if (way[a] == 0.0) continue; // the tracer compares the origin
+      const double x = -origin[a] / way[a], y = (last - origin[a]) / way[a];
+      enter = std::max(enter, std::min(x, y)), leave = std::min(leave, std::max(x, y));
+    }
+    const DVec3 start = origin + enter * way;
+    if (!(enter <= leave) || !is_finite(Vec3(start))) return std::nullopt;
     const FieldTracer tracer(proxy.field, (proxy.record.flags & voxels::kSigned) != 0);
-    const auto hit = tracer.first_hit(glm::vec3(origin), glm::vec3(direction / length),
-                                      static_cast<float>(t_min * length), static_cast<float>(t_max * length));
-    if (!hit || !(double{hit->t} / length < t_max)) return std::nullopt;
-    return ProxyHit{double{hit->t} / length, {}, DVec3(hit->normal)};
+    const auto hit = tracer.first_hit(glm::vec3(start), glm::vec3(way), 0.0f, static_cast<float>(leave - enter));
+    if (!hit) return std::nullopt;
+    const double t = (enter + double{hit->t}) / length;
+    if (!(t < t_max)) return std::nullopt;
+    return ProxyHit{t, {}, DVec3(hit->normal)};
   }
   const auto hit = VoxelTracer(proxy.voxels).first_hit(origin, direction, t_min, t_max);
   if (!hit) return std::nullopt;
@@ -95,8 +107,8 @@ std::optional<SceneVoxelHit> VoxelScene::first_hit(DVec3 origin, DVec3 direction
   const Placed& from = placed_[best_thing];
   const Proxy& proxy = proxies_[from.proxy];
   SceneVoxelHit result;
-  result.t = best->t, result.instance = from.instance, result.voxel = best->voxel, result.placed = best_thing,
-  result.is_field = proxy.is_field();
+  result.t = best->t, result.instance = from.instance, result.voxel = best->voxel, result.placed = best_thing;
+  if (proxy.is_field()) result.clearance = (proxy.record.flags & voxels::kSigned) != 0 ? 0.3 : 0.9;
   result.normal = glm::normalize(from.world_normal * best->normal);
   result.edge = 1.0 / glm::length(glm::transpose(glm::dmat3(from.grid_from_world)) * best->normal);
   if (!proxy.palette.empty()) result.albedo = linear_color(proxy.palette[proxy.voxels.swatch(best->voxel)]);

@@ -16,11 +16,11 @@ struct SceneVoxelHit {
   double t = 0.0;
   uint32_t instance = 0;
   VoxelIndex voxel{};
-  DVec3 normal{0.0};   ///< unit, world space, of the face that the ray enters through, towards the ray's origin
-  uint32_t placed = 0; ///< number among the scene's instances
-  double edge = 0.0;   ///< length of a voxel along the normal, world units
-  bool is_field = false;
-  Vec3 albedo{0.8f}; ///< linear; of the voxel's swatch if it has one
+  DVec3 normal{0.0};       ///< unit, world space, of the face that the ray enters through, towards the ray's origin
+  uint32_t placed = 0;     ///< number among the scene's instances
+  double edge = 0.0;       ///< length of a voxel along the normal, world units
+  double clearance = 1e-3; ///< of origins of rays that leave the surface, along the normal in units of `edge`
+  Vec3 albedo{0.8f};       ///< linear; of the voxel's swatch if it has one
 };
 
 /// Ambient occlusion of a distance field without rays, see FieldTracer.

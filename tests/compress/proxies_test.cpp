@@ -64,6 +64,21 @@ TEST(Proxies, StatedErrorsHoldForAnIndependentSample) {
   }
 }
 
+/// A triangle in the corner of a voxel does not touch the octahedron that the separating rule tests.
+TEST(Proxies, SmallPartsFarFromOthersHaveAVoxel) {
+  Mesh mesh = test::sphere_mesh(40);
+  const auto first = static_cast<uint32_t>(mesh.positions.size());
+  for (const Vec3 p : {Vec3(-1, -1, -1), Vec3(-0.995f, -1, -1), Vec3(-1, -0.995f, -1)}) mesh.positions.push_back(p);
+  if (!mesh.normals.empty()) mesh.normals.resize(mesh.positions.size(), Vec3(0, 0, -1));
+  if (!mesh.uvs.empty()) mesh.uvs.resize(mesh.positions.size());
+  mesh.triangles.emplace_back(first, first + 2, first + 1);
+  BakeConfig config = proxy_config(40);
+  config.proxy.rule = VoxelRule::kSeparating;
+  const Proxy proxy = proxies_of(test::bake(test::scene_of(mesh), config)).at(0);
+  EXPECT_TRUE(decode_occupancy(proxy.voxels).contains(0, 0, 0));
+  EXPECT_LE(proxy.record.surface_error, std::sqrt(3.0) * proxy.record.edge);
+}
+
 TEST(Proxies, ClosedGeometriesAreFilledAndOpenOnesReported) {
   BakeConfig config = proxy_config();
   config.proxy.fill = true;
@@ -86,7 +101,7 @@ TEST(Proxies, GeometryThatOccludesNothingGetsNone) {
   const BakedScene baked = test::bake(scene, proxy_config());
   EXPECT_TRUE(proxies_of(baked).empty());
   ASSERT_EQ(baked.report.warnings.size(), 1u);
-  EXPECT_NE(baked.report.warnings[0].find("no occluding triangle"), std::string::npos);
+  EXPECT_NE(baked.report.warnings[0].find("nothing that occludes"), std::string::npos);
   EXPECT_TRUE(proxies_of(test::bake(Scene{}, proxy_config())).empty());
 }
 

@@ -38,11 +38,14 @@ struct Palette {
   }
 };
 
-Proxy build_voxels(const BakedFile& file, uint32_t geometry, std::span<const uint32_t> runs,
-                   const OccludingTriangles& source, const ProxyConfig& config, const MemoryBudget& budget) {
+/// None if alpha masks leave no voxel.
+std::optional<Proxy> build_voxels(const BakedFile& file, uint32_t geometry, std::span<const uint32_t> runs,
+                                  const OccludingTriangles& source, const ProxyConfig& config,
+                                  const MemoryBudget& budget) {
   const baked::GeometryRecord& record = file.geometries()[geometry];
   const std::string name(file.text(record.name));
   const GeometryVoxels voxels = voxelize(file, runs, source, config, budget, name);
+  if (voxels.set.count() == 0) return std::nullopt;
   Proxy proxy;
   OccupancyOptions options;
   options.dag = config.dag;
@@ -88,8 +91,10 @@ Proxy build_distances(const BakedFile& file, uint32_t geometry, const OccludingT
   return proxy;
 }
 
-Proxy build_any(const BakedFile& file, uint32_t geometry, std::span<const uint32_t> runs,
-                const OccludingTriangles& source, const ProxyConfig& config, const MemoryBudget& budget) {
+std::optional<Proxy> build_any(const BakedFile& file, uint32_t geometry, std::span<const uint32_t> runs,
+                               const ProxyConfig& config, const MemoryBudget& budget,
+                               const OccludingTriangles& source) {
+  if (source.triangles.empty()) return std::nullopt;
   return config.use == ProxyUse::kField ? build_distances(file, geometry, source, config, budget)
                                         : build_voxels(file, geometry, runs, source, config, budget);
 }
@@ -111,19 +116,20 @@ std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& confi
     progress.advance();
     if ((instanced && world_space(g)) || runs[g].empty()) continue;
     const OccludingTriangles source = occluding_triangles(file, g, runs[g]);
-    if (source.triangles.empty()) {
+    std::optional<Proxy> proxy = build_any(file, g, runs[g], config, budget, source);
+    if (!proxy) {
       ++empty;
       continue;
     }
     open += config.fill && !source.closed;
-    proxies.push_back(build_any(file, g, runs[g], source, config, budget));
+    proxies.push_back(std::move(*proxy));
   }
   if (open > 0)
     warn(std::to_string(open) + " of " + std::to_string(proxies.size()) +
          " geometries are not closed; their voxels are not filled");
   if (empty > 0)
     warn(std::to_string(empty) + (empty == 1 ? " geometry has" : " geometries have") +
-         " no occluding triangle and get no proxy");
+         " nothing that occludes and get no proxy");
   return proxies;
 }
 
@@ -131,9 +137,7 @@ std::optional<Proxy> build_proxy(const BakedFile& file, uint32_t geometry, const
                                  const MemoryBudget& budget) {
   const std::vector<uint32_t> runs = material_runs(file.sections())[geometry];
   if (runs.empty()) return std::nullopt;
-  const OccludingTriangles source = occluding_triangles(file, geometry, runs);
-  if (source.triangles.empty()) return std::nullopt;
-  return build_any(file, geometry, runs, source, config, budget);
+  return build_any(file, geometry, runs, config, budget, occluding_triangles(file, geometry, runs));
 }
 
 std::vector<std::byte> with_proxies(const BakedFile& file, std::span<const Proxy> proxies) {

@@ -160,8 +160,11 @@ GeometryField build_field(const OccludingTriangles& source, const ProxyConfig& c
   GeometryField result;
   result.repaired = builder.repair();
   for (const float d : builder.distances()) result.band_samples += d < float{kFieldBand};
-  if (source.closed) builder.negate_inside(inside_voxels(source, config.voxels));
-  result.has_sign = source.closed;
+  if (source.closed) {
+    const VoxelSet inside = inside_voxels(source, config.voxels);
+    result.has_sign = inside.count() > 0; // not of sheets with two sides
+    if (result.has_sign) builder.negate_inside(inside);
+  }
   result.field = encode_field(builder.size(), builder.distances(), config.field_bits);
   result.edge = frame.edge;
   result.origin = frame.origin + frame.edge * (0.5 - double{kFieldMargin});

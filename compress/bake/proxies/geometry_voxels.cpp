@@ -94,13 +94,15 @@ MemoryReservation reserve(const LatticePoint& extent, uint32_t voxels, const Mem
 class Voxelizer {
 public:
   Voxelizer(const BakedFile& file, std::span<const uint32_t> runs, const OccludingTriangles& source,
-            const ProxyConfig& config)
-      : file_(file), runs_(runs), source_(source), config_(config), grid_(source.extent, config.voxels) {}
+            const ProxyConfig& config, const MemoryBudget& budget, const std::string& what)
+      : file_(file), runs_(runs), source_(source), config_(config), budget_(budget), what_(what),
+        grid_(source.extent, config.voxels) {}
 
   GeometryVoxels run() {
     result_.set = VoxelSet(grid_.size);
     result_.frame = voxel_frame(source_, config_.voxels);
     for_each_pair([&](const OccludingTriangle&, VoxelIndex v) { result_.set.set(v); });
+    if (config_.rule == VoxelRule::kSeparating) keep_small_parts();
     const VoxelSet surface = result_.set;
     if (config_.fill && source_.closed) fill();
     measure_voxels();
@@ -122,6 +124,25 @@ private:
           });
   }
 
+  /// The separating rule sets no voxel for a small part in a corner of one: sets the voxel of each triangle around
+  /// which no other is set.
+  void keep_small_parts() {
+    const VoxelSet before = result_.set;
+    const VoxelIndex size = before.size();
+    for (const OccludingTriangle& t : source_.triangles) {
+      if (t.masked) continue;
+      const DVec3 center = (vec(t.corners[0]) + vec(t.corners[1]) + vec(t.corners[2])) / (3.0 * grid_.edge_steps());
+      const DVec3 own = glm::clamp(glm::floor(center), DVec3(0.0), DVec3(size[0] - 1.0, size[1] - 1.0, size[2] - 1.0));
+      const auto x = static_cast<int64_t>(own.x), y = static_cast<int64_t>(own.y), z = static_cast<int64_t>(own.z);
+      bool near = false;
+      for (int64_t k = -1; k <= 1; ++k)
+        for (int64_t j = -1; j <= 1; ++j)
+          for (int64_t i = -1; i <= 1; ++i) near |= before.contains(x + i, y + j, z + k);
+      if (!near)
+        result_.set.set({static_cast<uint32_t>(own.x), static_cast<uint32_t>(own.y), static_cast<uint32_t>(own.z)});
+    }
+  }
+
   void fill() {
     result_.set.merge(inside_voxels(source_, config_.voxels));
     result_.filled = true;
@@ -131,6 +152,9 @@ private:
     constexpr float kNone = std::numeric_limits<float>::infinity();
     const double edge = grid_.edge_steps();
     const VoxelNumbers numbers(result_.set);
+    const MemoryReservation memory(
+        budget_, numbers.count() * (sizeof(float) + (config_.materials ? sizeof(result_.slots[0]) : 0)),
+        "the set voxels of " + what_);
     std::vector<float> distances(static_cast<size_t>(numbers.count()), kNone); // inside: nothing sets them
     if (config_.materials) result_.slots.resize(distances.size());
     for_each_pair([&](const OccludingTriangle& t, VoxelIndex v) {
@@ -160,6 +184,8 @@ private:
         for (int v = 0; u + v <= steps; ++v)
           largest = std::max(largest, nearest_squared(surface, a + (ab * double(u) + ac * double(v)) / double(steps)));
     }
+    if (!std::isfinite(largest))
+      throw Error(ErrorKind::kUsage, "voxels of " + what_ + ": parts of the geometry are far from any voxel");
     result_.surface_error = std::sqrt(largest) * result_.frame.edge;
   }
 
@@ -184,6 +210,8 @@ private:
   std::span<const uint32_t> runs_;
   const OccludingTriangles& source_;
   const ProxyConfig& config_;
+  const MemoryBudget& budget_;
+  const std::string& what_;
   FineGrid grid_;
   GeometryVoxels result_;
 };
@@ -196,7 +224,7 @@ GeometryVoxels voxelize(const BakedFile& file, std::span<const uint32_t> runs, c
     throw Error(ErrorKind::kUsage,
                 "voxels: a grid has 1 to " + std::to_string(kMaxGridSize) + " voxels along its longest side");
   const MemoryReservation memory = reserve(source.extent, config.voxels, budget, what);
-  return Voxelizer(file, runs, source, config).run();
+  return Voxelizer(file, runs, source, config, budget, what).run();
 }
 
 VoxelFrame voxel_frame(const OccludingTriangles& source, uint32_t voxels) {
