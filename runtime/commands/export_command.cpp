@@ -106,7 +106,9 @@ GltfConfig gltf_config(const ExportOptions& options) {
                    : *options.codec == kMeshopt ? GltfCodec::kMeshopt
                                                 : GltfCodec::kNone;
   if (options.level) config.draco.level = *options.level;
-  if (options.normal_bits) config.draco.normal_bits = config.meshopt_normal_bits = *options.normal_bits;
+  if (options.normal_bits)
+    (config.codec == GltfCodec::kMeshopt ? config.meshopt_normal_bits : config.draco.normal_bits) =
+        *options.normal_bits;
   if (options.uv_bits) config.draco.uv_bits = *options.uv_bits;
   if (options.webp_psnr) config.webp_psnr = *options.webp_psnr;
   config.instancing |= options.instancing;

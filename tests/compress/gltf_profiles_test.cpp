@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <optional>
@@ -6,8 +7,11 @@
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
+#include <webp/decode.h>
 
+#include "compress/exchange/gltf/image_codec.h"
 #include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/import_scene.h"
 #include "tests/compress/gltf_test_support.h"
 #include "tests/compress/test_scenes.h"
@@ -151,6 +155,97 @@ TEST(GltfRoundTrip, LatticesAreEqual) {
       after.insert(PositionGrid{back.geometries()[g].step_mantissa, back.geometries()[g].step_exponent}.step());
     EXPECT_EQ(before, after);
   }
+}
+
+/// Adds a triangle whose mesh states its lattice.
+/// @param step power of two
+/// @param corners in steps
+void add_stated(Scene& scene, double step, std::vector<Vec3> corners) {
+  Mesh mesh;
+  mesh.positions = std::move(corners);
+  for (Vec3& p : mesh.positions) p *= static_cast<float>(step);
+  mesh.triangles = {{0, 1, 2}};
+  mesh.lattice = {8, static_cast<int32_t>(std::log2(step)) - 3};
+  if (scene.meshes.empty())
+    scene = test::scene_of(std::move(mesh));
+  else
+    test::add_shape(scene, std::move(mesh));
+}
+
+std::vector<double> steps_of(const BakedFile& file) {
+  std::vector<double> steps;
+  for (uint32_t g = 0; g < file.base_geometry_count(); ++g)
+    steps.push_back(PositionGrid{file.geometries()[g].step_mantissa, file.geometries()[g].step_exponent}.step());
+  return steps;
+}
+
+void expect_same_after_export(const BakedFile& file, const GltfConfig& config) {
+  const TemporaryFolder folder;
+  write(folder / "a.glb", export_of(file, config).bytes);
+  const BakedScene again = bake_again(folder / "a.glb");
+  const BakedFile back = BakedFile::from_bytes(again.bytes);
+  EXPECT_EQ(steps_of(back), steps_of(file));
+  EXPECT_EQ(world_faces(back), world_faces(file));
+}
+
+/// Positions in object units, since no frame holds their extent of more than 2^23 steps, have the geometry's lattice.
+TEST(GltfRoundTrip, LatticesOfFloatsAmongIntegersAreEqual) {
+  Scene scene;
+  add_stated(scene, 0.5, {{0, 0, 0}, {8388999, 0, 0}, {0, 8388999, 5}});
+  const BakedScene baked = bake_for_shading(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(steps_of(file), std::vector<double>{0.5});
+  const GltfExport result = export_of(file, gltf_profile(GltfProfile::kWeb));
+  ASSERT_EQ(result.report.plain_primitives, 1u);
+  expect_same_after_export(file, gltf_profile(GltfProfile::kWeb));
+}
+
+TEST(GltfRoundTrip, LatticesOfIntegersWithNamesAreEqual) {
+  Scene scene;
+  add_stated(scene, 0.25, {{1, 0, 0}, {101, 0, 0}, {0, 103, 5}});
+  const BakedScene baked = bake_for_shading(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(steps_of(file), std::vector<double>{0.25});
+  GltfConfig config = gltf_profile(GltfProfile::kExchange);
+  config.codec = GltfCodec::kMeshopt;
+  expect_same_after_export(file, config);
+  expect_same_after_export(file, gltf_profile(GltfProfile::kWeb));
+}
+
+/// Each mesh lies within a frame, but no frame holds both, though their extent takes no more bits than the first's.
+TEST(GltfWeb, MeshesWithoutCommonFrameStayApart) {
+  Scene scene;
+  add_stated(scene, 1.0, {{-8380000, 0, 0}, {8200000, 0, 0}, {0, 8000000, 5}});
+  add_stated(scene, 1.0, {{8380000, 0, 0}, {8395000, 0, 0}, {8390000, 8000, 5}});
+  const BakedScene baked = bake_for_shading(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(steps_of(file), (std::vector<double>{1.0, 1.0}));
+  const GltfExport result = export_of(file, gltf_profile(GltfProfile::kWeb));
+  EXPECT_EQ(result.report.plain_primitives, 0u);
+  EXPECT_EQ(result.report.meshes, 2u);
+  expect_same_after_export(file, gltf_profile(GltfProfile::kWeb));
+}
+
+TEST(GltfConfigs, SettingsOfOtherCodecsAreNotChecked) {
+  GltfConfig config;
+  config.draco.normal_bits = config.meshopt_normal_bits = 20;
+  EXPECT_NO_THROW(validate(config));
+  config.codec = GltfCodec::kMeshopt;
+  EXPECT_THROW(validate(config), Error);
+  config.meshopt_normal_bits = 16, config.draco.normal_bits = 40;
+  EXPECT_NO_THROW(validate(config));
+  config.codec = GltfCodec::kDraco;
+  EXPECT_THROW(validate(config), Error);
+}
+
+TEST(GltfImages, ColoursOfTransparentPixelsStay) {
+  const RgbaImage image{2, 2, {255, 0, 0, 255, 0, 200, 30, 0, 7, 8, 9, 0, 0, 0, 255, 255}};
+  const WebpImage coded = encode_webp(image, 100.0);
+  std::vector<uint8_t> decoded(image.pixels.size());
+  ASSERT_NE(WebPDecodeRGBAInto(reinterpret_cast<const uint8_t*>(coded.bytes.data()), coded.bytes.size(), decoded.data(),
+                               decoded.size(), 8),
+            nullptr);
+  EXPECT_EQ(decoded, image.pixels);
 }
 
 TEST(GltfPortable, UsesNoExtension) {

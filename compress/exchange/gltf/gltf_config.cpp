@@ -28,11 +28,14 @@ void validate(const GltfConfig& config) {
   const auto require = [](bool condition, const char* message) {
     if (!condition) throw Error(ErrorKind::kUsage, message);
   };
-  require(config.draco.level >= 0 && config.draco.level <= 10, "Draco's level must be 0 to 10");
-  require(config.draco.normal_bits >= 2 && config.draco.normal_bits <= 30, "normals take 2 to 30 bits");
-  require(config.draco.uv_bits >= 1 && config.draco.uv_bits <= 30, "texture coordinates take 1 to 30 bits");
-  require(config.meshopt_normal_bits >= 4 && config.meshopt_normal_bits <= 16,
-          "normals of the codec meshopt take 4 to 16 bits");
+  if (config.codec == GltfCodec::kDraco) {
+    require(config.draco.level >= 0 && config.draco.level <= 10, "Draco's level must be 0 to 10");
+    require(config.draco.normal_bits >= 2 && config.draco.normal_bits <= 30, "normals take 2 to 30 bits");
+    require(config.draco.uv_bits >= 1 && config.draco.uv_bits <= 30, "texture coordinates take 1 to 30 bits");
+  }
+  if (config.codec == GltfCodec::kMeshopt)
+    require(config.meshopt_normal_bits >= 4 && config.meshopt_normal_bits <= 16,
+            "normals of the codec meshopt take 4 to 16 bits");
   require(config.webp_psnr >= 0.0 && config.webp_psnr <= 100.0, "the PSNR of textures must be 0 to 100 dB");
 }
 

@@ -45,7 +45,7 @@ struct GltfConfig {
 /// The settings of a profile.
 GltfConfig gltf_profile(GltfProfile profile);
 
-/// Throws Error(kUsage) for settings out of range.
+/// Throws Error(kUsage) for settings out of range. Those of codecs that are not chosen are not checked.
 void validate(const GltfConfig& config);
 
 } // namespace packtrace

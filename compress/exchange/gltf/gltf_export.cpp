@@ -42,7 +42,7 @@ public:
     GltfNodes(file_, config_, meshes, model_, result_.report).add_all(merged);
     meshes.finish();
     if (config_.codec == GltfCodec::kMeshopt && !config_.names)
-      model_.set_asset_extras({{"packtrace_lattice", {8, -3}}}); // positions are integers
+      model_.set_asset_extras(gltf_integer_lattice()); // meshes of floats state their own
     report();
     if (config_.buffer_name.empty()) {
       result_.bytes = model_.write_binary();

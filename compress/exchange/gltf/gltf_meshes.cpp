@@ -9,8 +9,10 @@
 namespace packtrace {
 namespace {
 
-/// The lattice that positions in object units lie on, for readers that keep it.
-GltfJson lattice_extras(const baked::GeometryRecord& geometry) {
+/// The lattice of a mesh's stored positions, for readers that keep it: steps of 1 if they are integers, otherwise the
+/// geometry's, in object units.
+GltfJson lattice_extras(const baked::GeometryRecord& geometry, bool integers) {
+  if (integers) return gltf_integer_lattice();
   return {{"packtrace_lattice", {geometry.step_mantissa, geometry.step_exponent}}};
 }
 
@@ -26,6 +28,8 @@ std::span<const float> floats_of(const std::vector<T>& values) {
 }
 
 } // namespace
+
+GltfJson gltf_integer_lattice() { return {{"packtrace_lattice", {8, -3}}}; }
 
 double lattice_step(const baked::GeometryRecord& geometry) {
   return PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step();
@@ -66,6 +70,7 @@ DracoGrids::Key DracoGrids::key(const baked::GeometryRecord& geometry, uint32_t 
 
 void GltfMeshes::add_geometry(uint32_t geometry, GltfGeometry&& from) {
   if (templates_.size() <= geometry) templates_.resize(geometry + 1), frames_.resize(geometry + 1, DAffine(1.0));
+  if (integers_.size() <= geometry) integers_.resize(geometry + 1);
   if (config_.codec == GltfCodec::kMeshopt) return add_meshopt(geometry, std::move(from));
   for (GltfPrimitive& primitive : from.primitives) {
     if (!from.with_uvs && !primitive.draco) primitive.plain.uvs.clear();
@@ -150,6 +155,7 @@ void GltfMeshes::add_meshopt(uint32_t geometry, GltfGeometry&& from) {
     primitive = {};
   }
   if (!frame) return;
+  integers_[geometry] = true;
   const double step = lattice_step(record);
   DAffine& map = frames_[geometry];
   map = DAffine(step);
@@ -200,10 +206,9 @@ std::optional<int> GltfMeshes::mesh_of(uint32_t geometry, uint32_t first_slot) {
   if (!added) return place->second;
   GltfJson mesh;
   const baked::GeometryRecord& record = file_.geometries()[geometry];
-  if (config_.names) {
-    mesh["name"] = to_utf8(file_.text(record.name));
-    mesh["extras"] = lattice_extras(record);
-  }
+  if (config_.names) mesh["name"] = to_utf8(file_.text(record.name));
+  // Integers need no extras without names: the asset states their lattice.
+  if (config_.names || !integers_[geometry]) mesh["extras"] = lattice_extras(record, integers_[geometry]);
   for (size_t i = 0; i < templates_[geometry].size(); ++i) {
     const Template& part = templates_[geometry][i];
     const uint32_t material = file_.sections().material_slots[first_slot + part.material_slot];
@@ -241,7 +246,7 @@ void GltfMeshes::add_world(std::vector<Placed>&& geometries) {
       const auto fits = [&](const Batch& batch) {
         GltfLatticeBox both = batch.box;
         both.extend(box);
-        return both.bits() <= std::max({kShortBits, box.bits(), batch.box.bits()});
+        return position_frame(both.lo, both.hi) && both.bits() <= std::max({kShortBits, box.bits(), batch.box.bits()});
       };
       auto to = std::ranges::find_if(open, fits);
       if (to == open.end()) to = open.insert(open.end(), Batch{});

@@ -14,6 +14,9 @@
 
 namespace packtrace {
 
+/// Extras of a mesh or an asset whose positions are integers: their lattice, in steps of 1.
+GltfJson gltf_integer_lattice();
+
 /// Step of a geometry's lattice, object units.
 double lattice_step(const baked::GeometryRecord& geometry);
 
@@ -112,6 +115,7 @@ private:
   GltfReport& report_;
   std::vector<std::vector<Template>> templates_; ///< by geometry
   std::vector<DAffine> frames_;                  ///< by geometry
+  std::vector<bool> integers_;                   ///< by geometry: whether positions are stored as integers
   std::vector<int> world_nodes_;
   std::map<std::pair<uint32_t, uint32_t>, int> meshes_;
   std::map<std::tuple<uint32_t, size_t, double, double, double, double>, int> mapped_;

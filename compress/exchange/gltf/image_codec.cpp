@@ -36,7 +36,7 @@ public:
     config.lossless = quality < 0 ? 1 : 0;
     config.quality = quality < 0 ? 100.0f : static_cast<float>(quality);
     config.use_sharp_yuv = 1;
-    config.exact = 0;
+    config.exact = 1; // filters mix the colours of transparent pixels into their neighbours
     picture.use_argb = 1;
     picture.width = static_cast<int>(image_.width);
     picture.height = static_cast<int>(image_.height);
