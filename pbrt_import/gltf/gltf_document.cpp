@@ -198,16 +198,16 @@ std::span<const std::byte> Document::uri_bytes(const Value& uri) {
 }
 
 std::span<const std::byte> Document::buffer_bytes(uint64_t number) {
-  if (const auto found = buffers_.find(number); found != buffers_.end()) return found->second;
   const Value buffer = element("buffers", number);
   const std::optional<Value> uri = buffer.find("uri");
   if (!uri && (number != 0 || binary_.data() == nullptr)) buffer.fail("has no uri, and is not the binary chunk");
-  std::span<const std::byte> bytes = uri ? uri_bytes(*uri) : binary_;
+  auto found = buffers_.find(number);
+  if (found == buffers_.end()) found = buffers_.emplace(number, uri ? uri_bytes(*uri) : binary_).first;
+  const std::span<const std::byte> bytes = found->second;
   const uint64_t length = buffer.at("byteLength").integer();
   if (length > bytes.size())
     buffer.fail("claims " + std::to_string(length) + " bytes, but has " + std::to_string(bytes.size()));
-  bytes = bytes.first(static_cast<size_t>(length));
-  return buffers_[number] = bytes;
+  return bytes.first(static_cast<size_t>(length));
 }
 
 std::span<const std::byte> Document::view_bytes(uint64_t number) {

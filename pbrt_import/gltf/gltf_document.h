@@ -59,7 +59,7 @@ private:
   std::string_view json_text_;
   std::span<const std::byte> binary_; ///< chunk of a .glb file
   nlohmann::json json_;
-  std::map<uint64_t, std::span<const std::byte>> buffers_, views_; ///< read so far
+  std::map<uint64_t, std::span<const std::byte>> buffers_, views_; ///< read so far; buffers as long as they are
   std::vector<std::unique_ptr<std::vector<std::byte>>> kept_;
   MemoryReservation memory_;
 };

@@ -42,9 +42,9 @@ const MaterialUse& Materials::use(std::optional<uint64_t> material) const {
 }
 
 std::string Materials::unique_name(const Value& material, size_t number) {
-  const std::string name = material.text_or("name", "material " + std::to_string(number));
-  const bool taken = std::ranges::any_of(uses_, [&](const MaterialUse& use) { return use.name == name; });
-  return taken || name.empty() ? name + " (" + std::to_string(number) + ")" : name;
+  std::string name = material.text_or("name", "material " + std::to_string(number));
+  while (name.empty() || !names_.insert(name).second) name += " (" + std::to_string(number) + ")";
+  return name;
 }
 
 void Materials::warn(const std::string& text) { document_.context().feed.reporter().warning(document_.place(), text); }
@@ -75,7 +75,16 @@ uint64_t image_of(const Value& texture) {
 
 /// Mean of an image's values, as they are stored.
 Vec3 Materials::image_average(const Value& info) {
-  const Value image = document_.element("images", image_of(document_.element("textures", info.at("index").integer())));
+  const uint64_t image = image_of(document_.element("textures", info.at("index").integer()));
+  const auto [place, added] = averages_.try_emplace(image);
+  Average& average = place->second;
+  if (added) average.problem = problem_of([&] { average.value = read_average(image); });
+  if (!average.problem.empty()) throw Error(ErrorKind::kInput, average.problem);
+  return average.value;
+}
+
+Vec3 Materials::read_average(uint64_t number) {
+  const Value image = document_.element("images", number);
   const std::optional<Value> uri = image.find("uri");
   const std::span<const std::byte> bytes =
       uri ? document_.uri_bytes(*uri) : document_.view_bytes(image.at("bufferView").integer());

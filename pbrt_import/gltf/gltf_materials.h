@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "pbrt_import/gltf/gltf_document.h"
@@ -30,11 +32,17 @@ public:
   const MaterialUse& use(std::optional<uint64_t> material) const;
 
 private:
+  /// Mean of an image.
+  struct Average {
+    Vec3 value{0.0f};
+    std::string problem; ///< why there is none; empty: there is one
+  };
   void define(const Value& material, MaterialUse& use);
   std::string define_image(const Value& info, MaterialUse& use, std::string_view what, std::optional<float> cutoff);
   void read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset);
   std::string image_file(uint64_t image);
   Vec3 image_average(const Value& info);
+  Vec3 read_average(uint64_t image);
   std::string unique_name(const Value& material, size_t number);
   void warn(const std::string& text);
 
@@ -42,6 +50,8 @@ private:
   FileNames& file_names_;
   std::vector<MaterialUse> uses_;
   MaterialUse default_;
+  std::unordered_set<std::string> names_; ///< of the materials so far
+  std::map<uint64_t, Average> averages_;  ///< by image
 };
 
 } // namespace packtrace::gltf

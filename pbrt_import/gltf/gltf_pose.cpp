@@ -1,24 +1,35 @@
 #include "pbrt_import/gltf/gltf_pose.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "pbrt_import/gltf/gltf_accessors.h"
 
 namespace packtrace::gltf {
 
-std::vector<DAffine> joint_maps(Document& document, uint64_t number, std::span<const PlacedNode> nodes) {
-  const Value skin = document.element("skins", number);
+Skins::Skins(Document& document, std::span<const PlacedNode> nodes)
+    : document_(document), nodes_(nodes), places_(document.count("nodes"), nodes.size()) {
+  for (size_t i = 0; i < nodes.size(); ++i) places_[static_cast<size_t>(nodes[i].node)] = i;
+}
+
+JointMaps Skins::joint_maps(uint64_t skin) {
+  JointMaps& maps = known_[skin];
+  if (!maps) maps = std::make_shared<const std::vector<DAffine>>(read(skin));
+  return maps;
+}
+
+std::vector<DAffine> Skins::read(uint64_t number) const {
+  const Value skin = document_.element("skins", number);
   const Value joints = skin.at("joints");
   std::vector<DAffine> maps;
   for (size_t i = 0; i < joints.size(); ++i) {
-    const auto placed = std::ranges::find(nodes, joints[i].integer(), &PlacedNode::node);
-    if (placed == nodes.end()) joints[i].fail("is a node outside the scene");
-    maps.push_back(placed->world_from_node);
+    const uint64_t node = joints[i].integer();
+    const size_t place = node < places_.size() ? places_[static_cast<size_t>(node)] : nodes_.size();
+    if (place == nodes_.size()) joints[i].fail("is a node outside the scene");
+    maps.push_back(nodes_[place].world_from_node);
   }
   const std::optional<uint64_t> accessor = skin.find_integer("inverseBindMatrices");
   if (!accessor) return maps;
-  const AccessorValues bind = read_floats(document, *accessor);
+  const AccessorValues bind = read_floats(document_, *accessor);
   constexpr uint32_t kMatrix = 16;
   if (bind.components != kMatrix || bind.count < maps.size()) skin.fail("has fewer inverse bind matrices than joints");
   for (size_t i = 0; i < maps.size(); ++i) {

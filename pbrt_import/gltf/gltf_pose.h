@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -9,16 +11,35 @@
 
 namespace packtrace::gltf {
 
+/// Maps of joints from where the mesh is bound to the world.
+using JointMaps = std::shared_ptr<const std::vector<DAffine>>;
+
 /// What deforms a mesh at the scene's time.
 struct Pose {
   std::vector<double> weights; ///< of morph targets; empty: the mesh's own
-  std::vector<DAffine> joints; ///< world_from_bind of each joint of the skin; empty: no skin
-  bool empty() const { return weights.empty() && joints.empty(); }
+  JointMaps joints;            ///< of the skin; null: no skin
+  bool skinned() const { return joints && !joints->empty(); }
+  bool empty() const { return weights.empty() && !skinned(); }
 };
 
-/// Maps of a skin's joints from where the mesh is bound to the world. Throws Error(kInput) if the skin is malformed or
-/// has a joint outside the scene.
-std::vector<DAffine> joint_maps(Document& document, uint64_t skin, std::span<const PlacedNode> nodes);
+/// The skins of a document at the scene's time.
+class Skins {
+public:
+  /// @param nodes must outlive this
+  Skins(Document& document, std::span<const PlacedNode> nodes);
+
+  /// Maps of a skin's joints; nodes with one skin share them. Throws Error(kInput) if the skin is malformed or has a
+  /// joint outside the scene.
+  JointMaps joint_maps(uint64_t skin);
+
+private:
+  std::vector<DAffine> read(uint64_t skin) const;
+
+  Document& document_;
+  std::span<const PlacedNode> nodes_;
+  std::vector<size_t> places_; ///< in nodes_ by number of a node; nodes_.size(): outside the scene
+  std::map<uint64_t, JointMaps> known_;
+};
 
 /// The joints that move a vertex: four at a time.
 struct JointSet {

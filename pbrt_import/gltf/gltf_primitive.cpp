@@ -41,9 +41,12 @@ PrimitiveMesh read_plain(Document& document, const Value& primitive, const std::
   mesh.positions = read_attribute(document, attributes, "POSITION", 3, mesh.vertices);
   mesh.normals = read_attribute(document, attributes, "NORMAL", 3, mesh.vertices);
   mesh.uvs = read_attribute(document, attributes, uv_name.c_str(), 2, mesh.vertices);
-  for (size_t set = 0; skinned && attributes.has(numbered("JOINTS_", set).c_str()); ++set)
+  constexpr size_t kMaxJointSets = 16;
+  for (size_t set = 0; skinned && attributes.has(numbered("JOINTS_", set).c_str()); ++set) {
+    if (set == kMaxJointSets) attributes.fail("has more than 16 sets of joints");
     mesh.joints.push_back({read_attribute(document, attributes, numbered("JOINTS_", set).c_str(), 4, mesh.vertices),
                            read_attribute(document, attributes, numbered("WEIGHTS_", set).c_str(), 4, mesh.vertices)});
+  }
   if (const std::optional<uint64_t> indices = primitive.find_integer("indices")) {
     mesh.indices = read_indices(document, *indices);
   } else {
@@ -79,7 +82,10 @@ void morph(Document& document, const Value& mesh_value, const Value& primitive, 
   const std::optional<Value> targets = primitive.find("targets"), own = mesh_value.find("weights");
   if (!targets) return;
   if (weights.empty() && own) weights = own->numbers(own->size());
-  for (size_t i = 0; i < std::min(targets->size(), weights.size()); ++i) {
+  if (!weights.empty() && weights.size() != targets->size())
+    primitive.fail("has " + std::to_string(targets->size()) + " morph targets, but " + std::to_string(weights.size()) +
+                   " weights");
+  for (size_t i = 0; i < weights.size(); ++i) {
     const double weight = weights[i];
     if (weight == 0.0) continue;
     uint64_t vertices = mesh.vertices;
@@ -171,15 +177,15 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
   const MaterialUse& use = materials.use(primitive.find_integer("material"));
   const std::string uv_name = "TEXCOORD_" + std::to_string(use.uv_set);
   const std::optional<Value> draco = primitive.extension("KHR_draco_mesh_compression");
-  PrimitiveMesh mesh = draco ? read_draco(document, primitive, *draco, uv_name, !pose.joints.empty())
-                             : read_plain(document, primitive, uv_name, !pose.joints.empty());
+  PrimitiveMesh mesh = draco ? read_draco(document, primitive, *draco, uv_name, pose.skinned())
+                             : read_plain(document, primitive, uv_name, pose.skinned());
   if (mesh.positions.empty()) primitive.fail("has no positions");
   morph(document, mesh_value, primitive, pose.weights, mesh);
-  if (!pose.joints.empty()) {
+  if (pose.skinned()) {
     for (const JointSet& set : mesh.joints)
       if (set.joints.size() != mesh.vertices * 4 || set.weights.size() != mesh.vertices * 4)
         primitive.fail("has joints without weights");
-    move_with_joints(pose.joints, mesh.joints, primitive, mesh.positions, mesh.normals);
+    move_with_joints(*pose.joints, mesh.joints, primitive, mesh.positions, mesh.normals);
   }
   // Draco's decoder turns strips into triangles.
   const std::vector<int32_t> indices = triangles_of(mesh, draco ? Mode::kTriangles : Mode{mode}, primitive);
@@ -203,8 +209,7 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
     if (!mesh.normals.empty()) feed.floats(ParameterType::kNormal, "N", mesh.normals);
     if (!mesh.uvs.empty()) feed.floats(ParameterType::kFloat, "uv", mesh.uvs);
     feed.integers("indices", indices);
-    if (const std::optional<std::vector<int32_t>> lattice =
-            lattice_of(document, mesh_value, primitive, !pose.joints.empty()))
+    if (const std::optional<std::vector<int32_t>> lattice = lattice_of(document, mesh_value, primitive, pose.skinned()))
       feed.integers("lattice", *lattice);
     if (use.absent)
       feed.number("alpha", 0.0f);

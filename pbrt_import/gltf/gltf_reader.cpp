@@ -21,7 +21,9 @@ void Reader::report(const std::string& problem, std::string_view consequence) {
 }
 
 void Reader::collect_meshes() {
+  Skins skins(*document_, nodes_);
   for (const PlacedNode& placed : nodes_) {
+    context_.progress.check_cancelled();
     report(problem_of([&] {
              const Value node = document_->element("nodes", placed.node);
              const std::optional<uint64_t> mesh = node.find_integer("mesh");
@@ -29,7 +31,7 @@ void Reader::collect_meshes() {
              document_->element("meshes", *mesh); // throws if there is none
              Pose pose{placed.weights, {}};
              if (const std::optional<uint64_t> skin = node.find_integer("skin")) {
-               pose.joints = joint_maps(*document_, *skin, nodes_);
+               pose.joints = skins.joint_maps(*skin);
                uses_.push_back({*mesh, DAffine(1.0), std::move(pose)}); // the node's own map does not matter
                return;
              }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include <webp/encode.h>
 
@@ -74,6 +75,43 @@ TEST(GltfSkins, MistakesAreReported) {
   GltfBuilder few = skinned();
   few.json["accessors"][few.json["skins"][0]["inverseBindMatrices"].get<size_t>()]["count"] = 1;
   EXPECT_TRUE(import_at(folder, few).reported("has fewer inverse bind matrices than joints"));
+}
+
+TEST(GltfSkins, NodesShareTheMapsOfASkin) {
+  const SceneFolder folder;
+  GltfBuilder gltf = skinned();
+  gltf.node({{"mesh", 0}, {"skin", 0}});
+  const Imported imported = import_at(folder, gltf);
+  EXPECT_EQ(imported.text(), "");
+  EXPECT_EQ(imported.scene.shapes.size(), 2u);
+}
+
+TEST(GltfSkins, SetsOfJointsAreLimited) {
+  const SceneFolder folder;
+  GltfBuilder gltf = skinned();
+  Json& attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"];
+  for (int set = 1; set < 16; ++set) {
+    attributes["JOINTS_" + std::to_string(set)] = attributes["JOINTS_0"];
+    attributes["WEIGHTS_" + std::to_string(set)] = attributes["WEIGHTS_0"];
+  }
+  EXPECT_EQ(import_at(folder, gltf).text(), "");
+  attributes["JOINTS_16"] = attributes["JOINTS_0"];
+  attributes["WEIGHTS_16"] = attributes["WEIGHTS_0"];
+  EXPECT_TRUE(import_at(folder, gltf).reported("has more than 16 sets of joints"));
+}
+
+TEST(GltfMorphs, WeightsMustMatchTheTargets) {
+  const SceneFolder folder;
+  for (const size_t count : {1, 2, 3}) {
+    GltfBuilder gltf;
+    const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+    const Json target = {{"POSITION", gltf.positions({0, 0, 1, 0, 0, 0, 0, 0, 0})}};
+    gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"targets", {target, target}}});
+    gltf.node({{"mesh", 0}, {"weights", std::vector<int>(count, 1)}});
+    const Imported imported = import_at(folder, gltf);
+    EXPECT_EQ(imported.reported("has 2 morph targets, but " + std::to_string(count) + " weights"), count != 2);
+    EXPECT_EQ(imported.scene.shapes.size(), count == 2 ? 1u : 0u);
+  }
 }
 
 TEST(GltfMorphs, WeightsAreAnimated) {
@@ -161,6 +199,56 @@ TEST(GltfImages, EveryPrefixAndFlippedByteOfWebpEndsWell) {
     bad[i] = static_cast<char>(bad[i] ^ 0x55);
     import_at(folder, with_material(material, bad, texture));
   }
+}
+
+TEST(GltfMaterials, NamesAreUnique) {
+  const SceneFolder folder;
+  GltfBuilder gltf;
+  const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const auto material = [](const char* name, double red) {
+    return Json{{"name", name}, {"pbrMetallicRoughness", {{"baseColorFactor", {red, 0, 0, 1}}}}};
+  };
+  gltf.json["materials"] = {material("a (2)", 0.2), material("a", 0.4), material("a", 0.6)};
+  Json primitives;
+  for (int i = 0; i < 3; ++i) primitives.push_back({{"attributes", {{"POSITION", positions}}}, {"material", i}});
+  gltf.mesh(primitives[0]);
+  gltf.json["meshes"][0]["primitives"] = primitives;
+  gltf.node({{"mesh", 0}});
+  const Imported imported = import_at(folder, gltf);
+  EXPECT_EQ(imported.text(), "");
+  std::set<std::string> names;
+  std::set<float> reds;
+  for (const Material& m : imported.scene.materials) names.insert(m.name), reds.insert(m.albedo.x);
+  for (const char* name : {"a", "a (2)", "a (2) (2)"}) EXPECT_TRUE(names.contains(name)) << name;
+  for (const float red : {0.2f, 0.4f, 0.6f}) EXPECT_TRUE(reds.contains(red)) << red;
+}
+
+/// An image, or a buffer that is too short, is read once, whatever uses it.
+TEST(GltfImages, FilesAreReadOnce) {
+  const SceneFolder folder;
+  folder.write("m.webp", webp_image());
+  folder.write("short.bin", "abc");
+  GltfBuilder gltf;
+  const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const Json material = {{"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", 0}}}}}};
+  for (int i = 0; i < 5; ++i) gltf.json["materials"].push_back(material);
+  gltf.json["images"] = {{{"uri", "m.webp"}}};
+  gltf.json["textures"] = {{{"source", 0}}};
+  gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"material", 4}});
+  gltf.node({{"mesh", 0}});
+  const uint64_t files = import_at(folder, gltf).statistics.files_read;
+  gltf.json["materials"] = {material};
+  gltf.json["meshes"][0]["primitives"][0]["material"] = 0;
+  EXPECT_EQ(import_at(folder, gltf).statistics.files_read, files);
+
+  Json text = Json::parse(gltf.text());
+  text["buffers"][0] = {{"byteLength", 36}, {"uri", "short.bin"}};
+  Json& primitives = text["meshes"][0]["primitives"];
+  for (int i = 0; i < 4; ++i) primitives.push_back(primitives[0]);
+  const Imported many = import_file(folder.write("b.gltf", text.dump()));
+  EXPECT_TRUE(many.reported("claims 36 bytes, but has 3"));
+  primitives = Json::array({primitives[0]});
+  EXPECT_EQ(import_file(folder.write("b.gltf", text.dump())).statistics.files_read, many.statistics.files_read);
 }
 
 TEST(GltfImages, MetalnessIsReducedToItsMean) {
