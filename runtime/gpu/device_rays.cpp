@@ -13,8 +13,9 @@ namespace packtrace::gpu {
 namespace {
 
 constexpr uint32_t kThreads = 64; ///< of a workgroup
-constexpr uint32_t kMaxLanes = 32, kMaxQueueNodes = 1u << 24;
+constexpr uint32_t kMinLanes = 4, kMaxLanes = 32, kMaxQueueNodes = 1u << 24;
 constexpr uint32_t kFirstBinding = kSceneBindings;
+constexpr uint32_t kOrders = 3;       ///< of samples
 constexpr uint32_t kMaxSamples = 256; ///< of a point in a dispatch
 /// Of a thread: Mesa's CPU device ends loops after 65,535 iterations of an invocation.
 constexpr uint32_t kMaxNearestSamples = 16;
@@ -23,14 +24,30 @@ uint32_t groups_of(uint64_t threads) { return static_cast<uint32_t>((threads + k
 
 uint32_t blocks_of(const CameraRecord& camera) { return (camera.width + 7) / 8 * ((camera.height + 3) / 4); }
 
+/// Sizes of dispatches. Parts of a picture differ in cost, so the slowest dispatch of late decides.
+struct Pace {
+  uint64_t rays = 1u << 14; ///< of the next dispatch
+  double slowest_ms = 0.0;  ///< time of a ray; 0: not known
+
+  /// Dispatches may grow to twice their size at once, and shrink to any.
+  void adapt(uint64_t last_rays, double ms, double wanted_ms) {
+    slowest_ms *= 0.8;
+    // Short dispatches do not fill the device: their time says little of longer ones.
+    if (ms > wanted_ms / 4) slowest_ms = std::max(slowest_ms, ms / static_cast<double>(last_rays));
+    const double grown = 2.0 * static_cast<double>(last_rays);
+    rays =
+        std::max(static_cast<uint64_t>(slowest_ms * grown > wanted_ms ? wanted_ms / slowest_ms : grown), uint64_t{1});
+  }
+};
+
 /// Runs work items in dispatches that take about the wanted time.
 class TimedDispatches {
 public:
-  /// @param rays of the first dispatch; set to what the last one's time suggests
+  /// @param pace of the dispatches, which follows their times
   /// @param rays_per_item rays of a work item
-  TimedDispatches(Device& device, uint64_t& rays, uint64_t rays_per_item, uint64_t most_items,
+  TimedDispatches(Device& device, Pace& pace, uint64_t rays_per_item, uint64_t most_items,
                   const DeviceRays::Watch& watch)
-      : device_(device), rays_(rays), rays_per_item_(rays_per_item), watch_(watch),
+      : device_(device), pace_(pace), rays_per_item_(rays_per_item), watch_(watch),
         most_(std::max(most_items, uint64_t{1})) {}
 
   /// @param run function of the first item and the number of items that returns ms
@@ -38,7 +55,7 @@ public:
   DeviceTime all(uint64_t count, uint64_t granularity, const Run& run) {
     DeviceTime time;
     for (uint64_t first = 0; first < count;) {
-      const uint64_t fitting = std::min(rays_ / rays_per_item_, most_);
+      const uint64_t fitting = std::min(pace_.rays / rays_per_item_, most_);
       const uint64_t wanted = std::max(fitting / granularity, uint64_t{1}) * granularity;
       const uint64_t items = std::min(count - first, wanted);
       if (watch_) watch_(static_cast<double>(first) / static_cast<double>(count));
@@ -46,17 +63,15 @@ public:
       first += items;
       time.ms += ms, ++time.dispatches;
       time.longest_ms = std::max(time.longest_ms, ms);
-      if (items == wanted || ms > device_.config().dispatch_ms) {
-        const double factor = std::clamp(device_.config().dispatch_ms / std::max(ms, 1e-3), 0.25, 4.0);
-        rays_ = std::max(static_cast<uint64_t>(factor * static_cast<double>(items * rays_per_item_)), uint64_t{1});
-      }
+      if (items == wanted || ms > device_.config().dispatch_ms)
+        pace_.adapt(items * rays_per_item_, ms, device_.config().dispatch_ms);
     }
     return time;
   }
 
 private:
   Device& device_;
-  uint64_t& rays_;
+  Pace& pace_;
   uint64_t rays_per_item_;
   const DeviceRays::Watch watch_;
   uint64_t most_;
@@ -78,8 +93,9 @@ struct DeviceRays::State {
   Buffer cameras, hits, rays, points, counts, sums;
   uint32_t point_count = 0;
   std::unique_ptr<Kernel> camera_kernel, points_kernel, rays_kernel, queue_kernel, nearest_kernel;
-  uint64_t placed = 0; ///< GpuScene::State::placed of the kernels
-  uint64_t camera_rays = 1u << 14, queue_rays = 1u << 14, nearest_rays = 1u << 13; ///< of the next dispatch
+  uint64_t placed = 0;                                          ///< GpuScene::State::placed of the kernels
+  std::vector<uint32_t> constants;                              ///< GpuScene::State::constants of the kernels
+  Pace camera_pace, queue_pace[kOrders], nearest_pace[kOrders]; ///< of occlusion rays by the order of samples
 
   void make_room(Buffer& buffer, uint64_t bytes, const char* what) {
     if (buffer.bytes() >= bytes) return;
@@ -89,12 +105,17 @@ struct DeviceRays::State {
   uint64_t most_threads() const { return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * kThreads; }
   void make_queue_kernel();
   template <typename Threads>
-  DeviceTime run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples,
-                     uint64_t& rays_at_once, const Threads& threads, const Watch& watch);
-  /// Drops kernels that were made for other placements.
+  DeviceTime run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples, Pace& pace,
+                     const Threads& threads, const Watch& watch);
+  /// Binds the scene's current buffers to the kernels, and drops those that were made for another kind of scene.
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
-    camera_kernel.reset(), points_kernel.reset(), rays_kernel.reset(), queue_kernel.reset(), nearest_kernel.reset();
+    const bool same = std::exchange(constants, scene.constants) == scene.constants;
+    for (auto* kernel : {&camera_kernel, &points_kernel, &rays_kernel, &queue_kernel, &nearest_kernel})
+      if (same && *kernel)
+        scene.bind_scene(**kernel);
+      else
+        kernel->reset();
   }
 };
 
@@ -112,7 +133,7 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   if (!s.camera_kernel) s.camera_kernel = s.scene.make_kernel(spirv::camera(), kFirstBinding + 3, sizeof(SpanRecord));
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.camera_kernel->bind(kFirstBinding + i, *buffers[i]);
-  TimedDispatches dispatches(*s.device, s.camera_rays, 1, s.most_threads(), {});
+  TimedDispatches dispatches(*s.device, s.camera_pace, 1, s.most_threads(), {});
   return dispatches.all(uint64_t{blocks_of(camera)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
     const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), baked::kVisibleToCamera,
                           keep_rays ? 1u : 0u};
@@ -145,7 +166,8 @@ void DeviceRays::release() {
 }
 
 bool DeviceRays::can_count() const {
-  return state_->device->traits().subgroup_size <= kMaxLanes && state_->scene.node_count <= kMaxQueueNodes;
+  const uint32_t lanes = state_->device->traits().subgroup_size;
+  return lanes >= kMinLanes && lanes <= kMaxLanes && state_->scene.node_count <= kMaxQueueNodes;
 }
 
 void DeviceRays::State::make_queue_kernel() {
@@ -158,7 +180,7 @@ void DeviceRays::State::make_queue_kernel() {
 /// @param threads function of a number of samples: threads of a point
 template <typename Threads>
 DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples,
-                                      uint64_t& rays_at_once, const Threads& threads, const Watch& watch) {
+                                      Pace& pace, const Threads& threads, const Watch& watch) {
   DeviceTime time;
   for (uint32_t done = 0; done < samples.sample_count;) {
     OcclusionRecord part = samples;
@@ -168,7 +190,7 @@ DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecor
     const Watch watch_part = [&](double share) {
       if (watch) watch((done + share * part.sample_count) / samples.sample_count);
     };
-    TimedDispatches dispatches(*device, rays_at_once, part.sample_count, most_threads() / per_point / 2, watch_part);
+    TimedDispatches dispatches(*device, pace, part.sample_count, most_threads() / per_point / 2, watch_part);
     const DeviceTime of_part = dispatches.all(point_count, 2 * kThreads, [&](uint64_t first, uint64_t count) {
       part.first_point = static_cast<uint32_t>(first), part.point_count = static_cast<uint32_t>(count);
       return device->run(kernel, push_bytes(part), groups_of((count + 31) / 32 * 32 * per_point));
@@ -183,9 +205,8 @@ DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecor
 DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watch& watch) {
   State& s = *state_;
   if (!can_count())
-    throw Error(ErrorKind::kUnsupported,
-                "backend gpu: counting occluded rays needs subgroups of at most 32 lanes and at "
-                "most 2^24 nodes");
+    throw Error(ErrorKind::kUnsupported, "backend gpu: counting occluded rays needs subgroups of 4 to 32 lanes and at "
+                                         "most 2^24 nodes");
   s.follow_scene();
   s.make_room(s.counts, uint64_t{s.point_count} * sizeof(uint32_t), "counts");
   s.device->fill(s.counts, 0);
@@ -193,7 +214,7 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watc
   s.queue_kernel->bind(kFirstBinding, s.points);
   s.queue_kernel->bind(kFirstBinding + 1, s.counts);
   const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };
-  return s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_rays, threads, watch);
+  return s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_pace[samples.order], threads, watch);
 }
 
 DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& watch) {
@@ -205,7 +226,9 @@ DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& 
     s.nearest_kernel = s.scene.make_kernel(spirv::occlusion_nearest(), kFirstBinding + 2, sizeof(OcclusionRecord));
   s.nearest_kernel->bind(kFirstBinding, s.points);
   s.nearest_kernel->bind(kFirstBinding + 1, s.sums);
-  return s.run_all(*s.nearest_kernel, samples, kMaxNearestSamples, s.nearest_rays, [](uint32_t) { return 1u; }, watch);
+  return s.run_all(
+      *s.nearest_kernel, samples, kMaxNearestSamples, s.nearest_pace[samples.order], [](uint32_t) { return 1u; },
+      watch);
 }
 
 uint32_t DeviceRays::point_count() const { return state_->point_count; }

@@ -34,7 +34,7 @@ public:
   /// Called before each dispatch with the share of the call's work that is done; may throw.
   using Watch = std::function<void(double share)>;
 
-  /// Whether the device can run count_occluded(): subgroups of at most 32 lanes, and at most 2^24 nodes.
+  /// Whether the device can run count_occluded(): subgroups of 4 to 32 lanes, and at most 2^24 nodes.
   bool can_count() const;
   /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
   /// Throws Error(kUnsupported) unless can_count().

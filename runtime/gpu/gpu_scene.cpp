@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <utility>
 
 #include "pbrt_import/base/error.h"
 #include "runtime/gpu/gpu_scene_state.h"
@@ -13,6 +14,7 @@ namespace {
 
 constexpr uint32_t kRaysBinding = kSceneBindings, kResultsBinding = kSceneBindings + 1, kBindings = kSceneBindings + 2;
 constexpr uint32_t kGroupSize = 64;
+constexpr uint32_t kLeafCorners = 48;             ///< most corners of a leaf, which a subgroup decodes together
 constexpr uint32_t kMaxRays = 65535 * kGroupSize; ///< of a dispatch
 constexpr uint64_t kPayloadPadding = 16;          ///< kernels read three words from a field's first on
 
@@ -50,16 +52,26 @@ void GpuScene::State::upload_all(const SceneTables& t) {
   payload = upload_span(device, t.payload, "clusters' bits", kPayloadPadding);
   trees = upload_span(device, t.trees, "trees");
   exact_vertices = upload_span(device, t.exact_vertices, "exact vertices");
-  masks = upload_span(device, t.masks, "masks");
   upload_placements(t);
 }
 
+/// Uploads placements and what depends on them. The old buffers stay if there is no room for all new ones.
 void GpuScene::State::upload_placements(const SceneTables& t) {
   std::vector<packed::TracePlacement> all(t.placements.begin(), t.placements.end());
   all.push_back(t.top);
-  placements = upload_span(device, std::span<const packed::TracePlacement>(all), "placements");
-  top_nodes = upload_span(device, t.top_nodes, "the tree over placements");
-  scene = upload_span(device, std::span<const SceneRecord>(&t.scene, 1), "the scene's record");
+  Buffer new_placements = upload_span(device, std::span<const packed::TracePlacement>(all), "placements");
+  Buffer new_top_nodes = upload_span(device, t.top_nodes, "the tree over placements");
+  Buffer new_scene = upload_span(device, std::span<const SceneRecord>(&t.scene, 1), "the scene's record");
+  // The placements' materials are the last words of the masks; there are as many as placements that are not flat.
+  const std::span<const std::byte> words = std::as_bytes(t.masks);
+  if (masks.bytes() == 0 || words.size() > masks.bytes())
+    masks = upload_span(device, t.masks, "masks");
+  else if (!words.empty())
+    update(device, masks, sizeof(uint32_t) * uint64_t{t.scene.material_word},
+           words.subspan(sizeof(uint32_t) * size_t{t.scene.material_word}));
+  placements = std::move(new_placements), top_nodes = std::move(new_top_nodes), scene = std::move(new_scene);
+  for (Kernel* kernel : {closest.get(), any.get()})
+    if (kernel != nullptr) bind_scene(*kernel);
   ++placed;
 }
 
@@ -67,20 +79,22 @@ void GpuScene::State::make_kernels(const SceneTables& t) {
   const auto any_tree = [&](uint32_t flags) {
     return std::ranges::any_of(t.trees, [&](const TreeRecord& tree) { return (tree.flags & flags) != 0; }) ? 1u : 0u;
   };
-  top_levels = levels_of(t.top_nodes);
+  const uint32_t levels = levels_of(t.top_nodes);
   const DeviceTraits& traits = device->traits();
   constants = {exact ? 1u : 0u,
                traits.fused_doubles ? 1u : 0u,
-               top_levels + t.tree_levels + 1,
+               levels + t.tree_levels + 1,
                t.top_nodes.empty() ? 0u : 1u,
                any_tree(kFineTree | kInexactDifferences),
                any_tree(kGraded),
                t.masks.empty() ? 0u : 1u,
                t.exact_vertices.empty() ? 0u : 1u,
                traits.half_bytes ? 1u : 0u,
-               traits.subgroup_size >= 16 ? 4u : 8u};
-  closest = make_kernel(spirv::trace_closest(), kBindings, sizeof(SpanRecord));
+               std::max(4u, (kLeafCorners + traits.subgroup_size - 1) / traits.subgroup_size)};
+  auto new_closest = make_kernel(spirv::trace_closest(), kBindings, sizeof(SpanRecord));
   any = make_kernel(spirv::trace_any(), kBindings, sizeof(SpanRecord));
+  closest = std::move(new_closest);
+  top_levels = levels, many_placements = !t.top_nodes.empty();
 }
 
 std::unique_ptr<Kernel> GpuScene::State::make_kernel(std::span<const uint32_t> spirv, uint32_t bindings,
@@ -161,12 +175,8 @@ GpuScene::~GpuScene() = default;
 void GpuScene::replace_placements(const SceneTables& tables) {
   const std::lock_guard lock(state_->mutex);
   state_->upload_placements(tables);
-  if (levels_of(tables.top_nodes) > state_->top_levels) {
+  if (levels_of(tables.top_nodes) > state_->top_levels || tables.top_nodes.empty() == state_->many_placements)
     state_->make_kernels(tables);
-  } else {
-    state_->bind_scene(*state_->closest);
-    state_->bind_scene(*state_->any);
-  }
 }
 
 void GpuScene::closest(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<packed::KernelHit> hits,

@@ -22,7 +22,8 @@ struct GpuScene::State {
   Buffer nodes, clusters, payload, placements, top_nodes, trees, exact_vertices, masks, scene;
   std::unique_ptr<Kernel> closest, any;
   std::vector<uint32_t> constants; ///< of all kernels: scene.glsl
-  uint32_t top_levels = 0;
+  uint32_t top_levels = 0;         ///< that the kernels have room for
+  bool many_placements = false;    ///< whether the kernels traverse a tree over placements
   size_t node_count = 0;
   uint64_t placed = 0; ///< times that placements were uploaded
   // Of the queries, under the mutex:

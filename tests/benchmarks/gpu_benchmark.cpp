@@ -109,8 +109,9 @@ public:
     rays_.make_points(1.0f);
     std::vector<gpu::PointRecord> points(rays_.point_count());
     rays_.points(points);
-    points_hit_ =
-        static_cast<uint64_t>(std::ranges::count_if(points, [](const auto& p) { return p.pixel != gpu::kNoPoint; }));
+    std::erase_if(points, [](const gpu::PointRecord& p) { return p.pixel == gpu::kNoPoint; }); // as pictures do
+    if (!points.empty()) rays_.set_points(points);
+    points_hit_ = points.size();
     out["points"] = points_hit_;
     for (const auto& [order, key] : {std::pair{gpu::kDirectionOrder, "direction"}, {gpu::kRandomOrder, "random"}}) {
       for (const uint32_t spp : options_.spp) out["occlusion"].push_back(run_occlusion(order, key, spp));

@@ -34,6 +34,8 @@ Buffer::Buffer(std::shared_ptr<Device> device, uint64_t bytes, BufferPlace place
     allocate(place, what);
   } catch (...) {
     vkDestroyBuffer(device_->handle(), buffer_, nullptr);
+    vkFreeMemory(device_->handle(), memory_, nullptr);
+    device_->allocated_ -= allocated_;
     throw;
   }
 }

@@ -12,6 +12,8 @@ namespace packtrace::gpu {
 void check(VkResult result, const char* call) {
   if (result == VK_SUCCESS) return;
   if (result == VK_ERROR_DEVICE_LOST) throw DeviceLost(std::string("the GPU stopped working during ") + call);
+  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY)
+    throw Error(ErrorKind::kLimitExceeded, std::string("out of device memory during ") + call);
   throw Error(ErrorKind::kUnsupported, std::string("backend gpu: ") + call + " failed with VkResult " +
                                            std::to_string(static_cast<int>(result)));
 }
@@ -42,8 +44,13 @@ double Device::submit(const Record& record) {
   submit.commandBufferCount = 1;
   submit.pCommandBuffers = &commands_;
   const auto before = std::chrono::steady_clock::now();
-  check(vkQueueSubmit(queue_, 1, &submit, fence_), "vkQueueSubmit");
-  check(vkWaitForFences(device_, 1, &fence_, VK_TRUE, std::numeric_limits<uint64_t>::max()), "vkWaitForFences");
+  const VkResult submitted = vkQueueSubmit(queue_, 1, &submit, fence_);
+  const VkResult waited = submitted != VK_SUCCESS
+                              ? submitted
+                              : vkWaitForFences(device_, 1, &fence_, VK_TRUE, std::numeric_limits<uint64_t>::max());
+  lost_ = lost_ || waited == VK_ERROR_DEVICE_LOST;
+  check(submitted, "vkQueueSubmit");
+  check(waited, "vkWaitForFences");
   check(vkResetFences(device_, 1, &fence_), "vkResetFences");
   const double wall_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count();
   if (queries_ == VK_NULL_HANDLE || on_cpu()) return wall_ms;

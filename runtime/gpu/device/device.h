@@ -23,7 +23,8 @@ public:
   using std::runtime_error::runtime_error;
 };
 
-/// Throws DeviceLost, or Error that names the call, unless the result is VK_SUCCESS.
+/// Throws unless the result is VK_SUCCESS: DeviceLost, Error(kLimitExceeded) for memory, Error(kUnsupported) for the
+/// rest. The message names the call.
 void check(VkResult result, const char* call);
 
 /// What kernels must know of a device.
@@ -40,12 +41,14 @@ class Device {
 public:
   /// Throws Error(kUnsupported) if there is no loader, or no device with the features that kernels need.
   static std::shared_ptr<Device> open(const GpuConfig& config);
-  /// The device that another call with an equal configuration opened and that is still in use, else open().
+  /// The device that another call with an equal configuration opened and that is still in use and works, else open().
   static std::shared_ptr<Device> share(const GpuConfig& config);
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
 
+  /// Whether it stopped working.
+  bool lost() const { return lost_; }
   const GpuConfig& config() const { return config_; }
   std::string name() const { return properties_.deviceName; }
   bool on_cpu() const { return properties_.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU; }
@@ -99,6 +102,7 @@ private:
   DeviceTraits traits_;
   std::mutex queue_mutex_;
   std::atomic<uint64_t> allocated_ = 0;
+  std::atomic<bool> lost_ = false;
 };
 
 /// The names of all Vulkan devices, as GpuConfig::device finds them, with a note for those that lack features. Throws

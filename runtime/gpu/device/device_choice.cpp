@@ -240,7 +240,8 @@ std::shared_ptr<Device> Device::share(const GpuConfig& config) {
   const std::lock_guard lock(mutex);
   std::erase_if(opened, [](const std::weak_ptr<Device>& device) { return device.expired(); });
   for (const std::weak_ptr<Device>& weak : opened)
-    if (const std::shared_ptr<Device> device = weak.lock(); device && device->config() == config) return device;
+    if (const std::shared_ptr<Device> device = weak.lock(); device && !device->lost() && device->config() == config)
+      return device;
   const std::shared_ptr<Device> device = open(config);
   opened.push_back(device);
   return device;

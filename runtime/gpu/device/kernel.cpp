@@ -9,10 +9,12 @@ namespace packtrace::gpu {
 
 Kernel::Kernel(std::shared_ptr<Device> device, std::span<const uint32_t> spirv, std::span<const uint32_t> constants,
                uint32_t bindings, uint32_t push_bytes)
-    : device_(std::move(device)) {
+    : Kernel(std::move(device)) { // from here on the destructor runs, whatever is thrown
   create_layout(bindings, push_bytes);
   create_pipeline(spirv, constants);
 }
+
+Kernel::Kernel(std::shared_ptr<Device> device) : device_(std::move(device)) {}
 
 void Kernel::create_layout(uint32_t bindings, uint32_t push_bytes) {
   const VkDevice device = device_->handle();

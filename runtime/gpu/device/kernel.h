@@ -28,6 +28,7 @@ public:
 private:
   friend class Device;
 
+  explicit Kernel(std::shared_ptr<Device> device);
   void create_layout(uint32_t bindings, uint32_t push_bytes);
   void create_pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants);
 

@@ -5,7 +5,7 @@
 // A thread walks a ray's nodes and puts the leaves it reaches into its subgroup's queue. Once that is long enough, or no
 // ray goes on, the subgroup's lanes set up a leaf each, then decode a corner each, then test a pair of ray and triangle
 // each. Shared memory limits how many subgroups are there at once, so rays and leaves stay in registers and are shuffled.
-// Subgroups have at most 32 lanes, and nodes numbers below 2^24.
+// Subgroups have 4 to 32 lanes, and nodes numbers below 2^24.
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #extension GL_KHR_shader_subgroup_vote : require
@@ -76,6 +76,7 @@ bool enter_placement(UnitRay u, uint placement, inout Way way, inout GridRay r) 
 // Returns whether the ray may hit something.
 bool begin_way(UnitRay u, out Way way, inout GridRay top, inout GridRay r) {
   way = Way(false, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+  if (scene.placement_count == 0u) return false;
   if (!kManyPlacements) {
     way.in_tree = enter_placement(u, 0u, way, r);
     return way.in_tree;
@@ -158,6 +159,7 @@ void flush_leaves(GridRay r, uint tree_flags, uint e0, uint total) {
     // As many leaves as there is room for corners.
     bool lead_in = leads && LANE >= at && end_m - done <= capacity;
     uint batch = bitCount(subgroupBallot(lead_in).x);
+    if (batch == 0u) break; // a leaf is larger than kCorners allows
     uint all_m = subgroupShuffle(end_m, at + batch - 1u) - done, from = start_m - done;
     for (uint k0 = 0u; k0 < all_m; k0 += S) {
       uint mark = subgroupOr(lead_in && from - k0 < S ? 1u << (from - k0) : 0u);
