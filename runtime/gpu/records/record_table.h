@@ -161,6 +161,9 @@ constexpr bool same_layouts() {
 }
 static_assert(same_layouts(), "GLSL would lay out a record differently from C++");
 
+static_assert(sizeof(packed::TopNode) == 256 && offsetof(packed::TopNode, lo) == 0 &&
+              offsetof(packed::TopNode, hi) == 96);
+
 // Kernels read nodes as vectors of four words, and the records of the mask buffer as words.
 static_assert(sizeof(baked::PackedNode) == 80 && offsetof(baked::PackedNode, exponents) == 12 &&
               offsetof(baked::PackedNode, ray_classes) == 14 && offsetof(baked::PackedNode, first_triangle) == 15 &&

@@ -14,6 +14,7 @@
 #ifdef PARTITIONED
 #extension GL_NV_shader_subgroup_partitioned : require
 #endif
+#define FROM_SURFACES
 #include "traversal.glsl"
 #include "points.glsl"
 #include "leaves.glsl"
@@ -113,7 +114,7 @@ bool step_top(UnitRay u, GridRay top, inout Way way, inout GridRay r) {
 GridRay ray_of(GridRay r, uint lane) {
   GridRay p = r;
   p.origin = subgroupShuffle(r.origin, lane);
-  p.begin = subgroupShuffle(r.begin, lane);
+  p.begin = kMayBeFar ? subgroupShuffle(r.begin, lane) : 0.0;
   p.end = subgroupShuffle(r.end, lane);
   p.shear = subgroupShuffle(r.shear, lane);
   p.major = subgroupShuffle(r.major, lane);
@@ -210,8 +211,7 @@ void main() {
   uint in_part = (unit % units) * 32u + (item & 31u), number = push.first_point + in_part;
   uint slices = (push.sample_count + push.per_thread - 1u) / push.per_thread;
   bool valid = slice < slices && in_part < push.point_count;
-  Point point = read_point(valid ? number : push.first_point);
-  valid = valid && point.pixel != kNoPoint;
+  valid = valid && points[valid ? number : 0u].pixel != kNoPoint;
   uint s = push.first_sample + slice * push.per_thread;
   uint end = push.first_sample + min((slice + 1u) * push.per_thread, push.sample_count);
   uint occluded = 0u;
@@ -230,6 +230,7 @@ void main() {
     uint idle = bitCount(subgroupBallot(alive && !tracing && !pending).x);
     if (idle != 0u && (idle >= push.idle_lanes || !subgroupAny(tracing || pending))) {
       if (alive && !tracing && !pending) {
+        Point point = read_point(number); // again for each ray: it would take twelve registers all the way
         u = unit_ray(point.origin, sample_direction(point, s), 0.0, push.tfar);
         tracing = begin_way(u, way, top, r);
         ended = !tracing;

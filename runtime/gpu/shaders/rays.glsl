@@ -24,6 +24,13 @@ UnitRay unit_ray(vec3 origin, vec3 direction, float tnear, float tfar) {
 }
 vec3 along_k(vec3 v, uint major) { return major == 0u ? v : major == 1u ? v.yzx : v.zxy; }
 
+// Whether rays may start far away from a placed tree. Those from the surface of the only one do not.
+#ifdef FROM_SURFACES
+#define kMayBeFar kManyPlacements
+#else
+#define kMayBeFar true
+#endif
+
 // The value of the larger magnitude; NaN stays.
 double larger_magnitude(double most, double x) {
   double size = abs(x);
@@ -34,7 +41,7 @@ double larger_magnitude(double most, double x) {
 bool approach(uint number, double margin, inout dvec3 origin, dvec3 direction, out double moved_by) {
   double begin = 0.0lf, end = 1e300lf;
   moved_by = 0.0lf;
-  for (int i = 0; i < 3; ++i) {
+  [[unroll]] for (int i = 0; i < 3; ++i) {
     precise double lo = placements[number].box_lo[i] - margin - origin[i];
     precise double hi = placements[number].box_hi[i] + margin - origin[i];
     if (direction[i] == 0.0lf) {
@@ -55,7 +62,7 @@ bool approach(uint number, double margin, inout dvec3 origin, dvec3 direction, o
 
 void set_boxes(vec3 origin, vec3 direction, float pad_coordinate, float least, inout GridRay r) {
   float reach = max(max(pad_coordinate, abs(origin.x)), max(abs(origin.y), abs(origin.z)));
-  for (int i = 0; i < 3; ++i) {
+  [[unroll]] for (int i = 0; i < 3; ++i) {
     float over = divided(1.0, max(abs(direction[i]), least));
     float inverse = uintBitsToFloat(floatBitsToUint(over) | (floatBitsToUint(direction[i]) & 0x80000000u));
     precise float back = origin[i] * inverse, away = kBoxPad * reach * over;
@@ -70,7 +77,7 @@ void set_boxes(vec3 origin, vec3 direction, float pad_coordinate, float least, i
 bool enter(UnitRay u, uint number, float max_coordinate, float pad_coordinate, float least, out GridRay r) {
   dvec3 from = dvec3(u.origin), way = dvec3(u.direction), origin, direction;
   if ((placements[number].classes_aligned >> 16) != 0u) {
-    for (int i = 0; i < 3; ++i) {
+    [[unroll]] for (int i = 0; i < 3; ++i) {
       precise double d = placements[number].grid_from_unit[4 * i] * way[i];
       precise double s = placements[number].grid_from_unit[4 * i] * from[i];
       precise double o = s + placements[number].grid_from_unit[9 + i];
@@ -78,7 +85,7 @@ bool enter(UnitRay u, uint number, float max_coordinate, float pad_coordinate, f
       origin[i] = o;
     }
   } else {
-    for (int i = 0; i < 3; ++i) {
+    [[unroll]] for (int i = 0; i < 3; ++i) {
       double x = placements[number].grid_from_unit[i], y = placements[number].grid_from_unit[3 + i],
              z = placements[number].grid_from_unit[6 + i];
       precise double dx = x * way.x, dy = y * way.y, dz = z * way.z, d = dx + dy + dz;
@@ -96,7 +103,7 @@ bool enter(UnitRay u, uint number, float max_coordinate, float pad_coordinate, f
   double power = packDouble2x32(uvec2(0u, exponent)), scale = packDouble2x32(uvec2(0u, 0x7fe00000u - exponent));
   direction *= scale;
   double begin = 0.0lf;
-  if (away > double(kFar) * double(max_coordinate) &&
+  if (kMayBeFar && away > double(kFar) * double(max_coordinate) &&
       !approach(number, double(max_coordinate) / 256.0lf, origin, direction, begin))
     return false;
   vec3 rounded = vec3(origin), rounded_direction = vec3(direction);

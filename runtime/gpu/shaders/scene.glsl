@@ -20,6 +20,7 @@ layout(std430, binding = 1) readonly restrict buffer Clusters { uvec4 clusters[]
 layout(std430, binding = 2) readonly restrict buffer Payload { uint words[]; };
 layout(std430, binding = 3) readonly restrict buffer Placements { PlacementRecord placements[]; };
 layout(std430, binding = 4) readonly restrict buffer TopNodes { TopNode top_nodes[]; };
+layout(std430, binding = 4) readonly restrict buffer TopPlanes { vec4 top_planes[]; }; // 16 a node, lo and hi first
 layout(std430, binding = 5) readonly restrict buffer Trees { TreeRecord trees[]; };
 layout(std430, binding = 6) readonly restrict buffer ExactVertices { float exact_vertices[]; }; // 3 a vertex
 layout(std430, binding = 7) readonly restrict buffer Masks { uint mask_words[]; };

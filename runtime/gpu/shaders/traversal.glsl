@@ -93,7 +93,9 @@ uint pass_boxes(GridRay r, Node n, bool graded, inout float t[8]) {
         float t1 = min(min(fma(x1[j], a.x, far_bias.x), fma(y1[j], a.y, far_bias.y)),
                        min(fma(z1[j], a.z, far_bias.z), r.end));
         if (t0 <= t1) mask |= 1u << (4u * h + i + 2u * j);
+#ifdef CLOSEST
         t[4u * h + i + 2u * j] = t0;
+#endif
       }
     }
   return mask;
@@ -217,13 +219,19 @@ bool trace_placement(inout UnitRay u, inout Best best, uint placement, uint base
 uint pass_top_boxes(GridRay r, uint number, inout float t[8]) {
   bvec3 back = lessThan(r.inverse, vec3(0.0));
   uint mask = 0u;
-  [[unroll]] for (uint i = 0u; i < 8u; ++i) {
-    vec3 lo = vec3(top_nodes[number].lo[i], top_nodes[number].lo[8u + i], top_nodes[number].lo[16u + i]);
-    vec3 hi = vec3(top_nodes[number].hi[i], top_nodes[number].hi[8u + i], top_nodes[number].hi[16u + i]);
-    vec3 t0 = fma(mix(lo, hi, back), r.inverse, r.near_bias), t1 = fma(mix(hi, lo, back), r.inverse, r.far_bias);
-    float begin = max(max(t0.x, t0.y), max(t0.z, r.begin)), end = min(min(t1.x, t1.y), min(t1.z, r.end));
-    if (begin <= end) mask |= 1u << i;
-    t[i] = begin;
+  [[unroll]] for (uint h = 0u; h < 2u; ++h) { // planes of four children at a time
+    uint lo = 16u * number + h, hi = lo + 6u;
+    vec4 lx = top_planes[lo], ly = top_planes[lo + 2u], lz = top_planes[lo + 4u];
+    vec4 hx = top_planes[hi], hy = top_planes[hi + 2u], hz = top_planes[hi + 4u];
+    [[unroll]] for (uint j = 0u; j < 4u; ++j) {
+      vec3 a = vec3(lx[j], ly[j], lz[j]), b = vec3(hx[j], hy[j], hz[j]);
+      vec3 t0 = fma(mix(a, b, back), r.inverse, r.near_bias), t1 = fma(mix(b, a, back), r.inverse, r.far_bias);
+      float begin = max(max(t0.x, t0.y), max(t0.z, r.begin)), end = min(min(t1.x, t1.y), min(t1.z, r.end));
+      if (begin <= end) mask |= 1u << (4u * h + j);
+#ifdef CLOSEST
+      t[4u * h + j] = begin;
+#endif
+    }
   }
   return mask & top_nodes[number].slots;
 }
