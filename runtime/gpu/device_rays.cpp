@@ -14,6 +14,7 @@ namespace {
 
 constexpr uint32_t kThreads = 64; ///< of a workgroup
 constexpr uint32_t kMinLanes = 4, kMaxLanes = 32, kMaxQueueNodes = 1u << 24;
+constexpr uint64_t kMaxPoints = uint64_t{1} << 31;
 constexpr uint32_t kFirstBinding = kSceneBindings;
 constexpr uint32_t kOrders = 3;       ///< of samples
 constexpr uint32_t kMaxSamples = 256; ///< of a point in a dispatch
@@ -127,6 +128,8 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   s.follow_scene();
   s.camera = camera;
   const uint64_t pixels = uint64_t{camera.width} * camera.height;
+  if ((uint64_t{camera.width} + 8) * (uint64_t{camera.height} + 8) > kMaxPoints)
+    throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 pixels; use a smaller picture");
   s.make_room(s.hits, pixels * sizeof(packed::KernelHit), "hits");
   s.make_room(s.rays, keep_rays ? pixels * sizeof(packed::KernelRay) : 1, "rays");
   s.cameras = upload(s.device, push_bytes(camera), "the camera");
@@ -150,12 +153,17 @@ void DeviceRays::make_points(float lift) {
     s.points_kernel = s.scene.make_kernel(spirv::surface_points(), kFirstBinding + 4, sizeof(SpanRecord));
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays, &s.points};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.points_kernel->bind(kFirstBinding + i, *buffers[i]);
-  const SpanRecord span{0, s.point_count, 0, std::bit_cast<uint32_t>(lift)};
-  s.device->run(*s.points_kernel, push_bytes(span), groups_of(s.point_count));
+  for (uint64_t first = 0; first < s.point_count; first += s.most_threads()) {
+    const uint64_t count = std::min(s.point_count - first, s.most_threads());
+    const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), 0, std::bit_cast<uint32_t>(lift)};
+    s.device->run(*s.points_kernel, push_bytes(span), groups_of(count));
+  }
 }
 
 void DeviceRays::set_points(std::span<const PointRecord> points) {
   State& s = *state_;
+  if (points.size() > kMaxPoints)
+    throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 points at once; use a smaller picture");
   s.point_count = static_cast<uint32_t>(points.size());
   s.make_room(s.points, points.size_bytes(), "points");
   update(s.device, s.points, 0, std::as_bytes(points));
@@ -260,8 +268,11 @@ void DeviceRays::occlusion_rays(const OcclusionRecord& samples, std::span<packed
   s.rays_kernel->bind(kFirstBinding + 1, s.points); // not used
   s.rays_kernel->bind(kFirstBinding + 2, rays);
   OcclusionRecord all = samples;
-  all.first_point = 0, all.point_count = s.point_count;
-  s.device->run(*s.rays_kernel, push_bytes(all), groups_of(s.point_count));
+  for (uint64_t first = 0; first < s.point_count; first += s.most_threads()) {
+    all.first_point = static_cast<uint32_t>(first);
+    all.point_count = static_cast<uint32_t>(std::min(s.point_count - first, s.most_threads()));
+    s.device->run(*s.rays_kernel, push_bytes(all), groups_of(all.point_count));
+  }
   download(s.device, rays, 0, std::as_writable_bytes(out));
 }
 

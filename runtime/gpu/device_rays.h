@@ -28,7 +28,7 @@ public:
   DeviceTime trace_camera(const CameraRecord& camera, bool keep_rays);
   /// Makes a point of each pixel that was hit, lifted off its surface by a length of unit space.
   void make_points(float lift);
-  /// Uses other points, which lie on surfaces of the scene.
+  /// Uses other points, which lie on surfaces of the scene. Throws Error(kLimitExceeded) for more than 2^31.
   void set_points(std::span<const PointRecord> points);
 
   /// Called before each dispatch with the share of the call's work that is done; may throw.

@@ -58,7 +58,7 @@ double Device::submit(const Record& record) {
   check(vkGetQueryPoolResults(device_, queries_, 0, 2, sizeof stamps, stamps, sizeof stamps[0],
                               VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
         "vkGetQueryPoolResults");
-  return static_cast<double>(stamps[1] - stamps[0]) * double{limits().timestampPeriod} * 1e-6;
+  return static_cast<double>((stamps[1] - stamps[0]) & stamp_mask_) * double{limits().timestampPeriod} * 1e-6;
 }
 
 double Device::run(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups) {

@@ -89,6 +89,8 @@ private:
   const GpuConfig config_;
   VkInstance instance_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  /// volk's pointers are those of the instance that was loaded last, which may not have the extension.
+  PFN_vkDestroyDebugUtilsMessengerEXT destroy_messenger_ = nullptr;
   VkPhysicalDevice physical_ = VK_NULL_HANDLE;
   VkPhysicalDeviceProperties properties_{};
   VkPhysicalDeviceMemoryProperties memory_{};
@@ -99,6 +101,7 @@ private:
   VkCommandBuffer commands_ = VK_NULL_HANDLE;
   VkFence fence_ = VK_NULL_HANDLE;
   VkQueryPool queries_ = VK_NULL_HANDLE;
+  uint64_t stamp_mask_ = ~uint64_t{0}; ///< valid bits of timestamps
   DeviceTraits traits_;
   std::mutex queue_mutex_;
   std::atomic<uint64_t> allocated_ = 0;

@@ -149,6 +149,7 @@ void Device::create_instance() {
   messenger.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
   messenger.pfnUserCallback = add_message;
   check(vkCreateDebugUtilsMessengerEXT(instance_, &messenger, nullptr, &messenger_), "vkCreateDebugUtilsMessengerEXT");
+  destroy_messenger_ = vkDestroyDebugUtilsMessengerEXT;
 }
 
 void Device::choose_device() {
@@ -204,7 +205,9 @@ void Device::create_device() {
   check(vkAllocateCommandBuffers(device_, &commands, &commands_), "vkAllocateCommandBuffers");
   const VkFenceCreateInfo fence{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
   check(vkCreateFence(device_, &fence, nullptr, &fence_), "vkCreateFence");
-  if (families[family_].timestampValidBits == 0) return;
+  const uint32_t stamp_bits = families[family_].timestampValidBits;
+  if (stamp_bits == 0) return;
+  stamp_mask_ = ~uint64_t{0} >> (64 - stamp_bits);
   VkQueryPoolCreateInfo queries{};
   queries.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
   queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
@@ -219,7 +222,7 @@ Device::~Device() {
     vkDestroyCommandPool(device_, pool_, nullptr);
     vkDestroyDevice(device_, nullptr);
   }
-  if (messenger_ != VK_NULL_HANDLE) vkDestroyDebugUtilsMessengerEXT(instance_, messenger_, nullptr);
+  if (messenger_ != VK_NULL_HANDLE) destroy_messenger_(instance_, messenger_, nullptr);
   if (instance_ != VK_NULL_HANDLE) vkDestroyInstance(instance_, nullptr);
 }
 

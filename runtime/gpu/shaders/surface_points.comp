@@ -43,6 +43,7 @@ PointRecord make_point(uint at, uvec2 p) {
 void main() {
   uint i = gl_GlobalInvocationID.x;
   if (i >= span.count) return;
+  i += span.first;
   uint block = i >> 5, in_block = i & 31u, per_row = (camera.width + 7u) / 8u;
   uvec2 p = uvec2((block % per_row) * 8u + (in_block & 7u), (block / per_row) * 4u + (in_block >> 3));
   if (p.x < camera.width && p.y < camera.height) {

@@ -9,6 +9,7 @@
 
 #include "runtime/camera/lod_view.h"
 #include "runtime/trace/make_tracer.h"
+#include "runtime/trace/packed/scene/placed_trees.h"
 #include "tests/runtime/gpu/gpu_test_device.h"
 #include "tests/runtime/trace/packed_scenes.h"
 
@@ -194,6 +195,62 @@ TEST_F(GpuTracerTest, MovedInstances) {
   for (const RayHit& hit : test::closest(tracer, rays))
     on_mover += hit.valid() && tracer.resolve(hit).placement->instance == mover ? 1 : 0;
   EXPECT_GT(on_mover, 100u);
+}
+
+/// The last instances of a source as movers.
+Movers last_instances(const SceneSource& source, uint32_t count) {
+  Movers movers;
+  const uint32_t all = static_cast<uint32_t>(source.instances().size());
+  for (uint32_t i = all - count; i < all; ++i) movers.instances.push_back(i);
+  movers.world.extend(DVec3(-8)), movers.world.extend(DVec3(8));
+  return movers;
+}
+
+const Affine kFlat(placed({0, 0, 0}, DVec3(0)));
+
+/// Placements change their numbers, and each keeps the masks of its own instance.
+TEST_F(GpuTracerTest, MaskedInstancesThatBecomeFlatAndBack) {
+  Scene scene;
+  for (const float width : {6.0f, 6.5f})
+    add_object(scene, test::quad({-3, -2, 0}, {width, 0, 0}, {0, 5, 0}), kAlphaMask);
+  scene.masks.push_back({64, 1, WrapMode::kRepeat, Vec2(4, 1), Vec2(0), {0u, ~0u}});
+  scene.masks.push_back({64, 1, WrapMode::kRepeat, Vec2(3, 1), Vec2(0), {~0u, 0u}});
+  scene.materials[0].alpha_mask = 0, scene.materials[1].alpha_mask = 1;
+  for (const uint32_t object : {0u, 0u, 1u, 1u}) {
+    const double z = 2.0 * static_cast<double>(scene.instances.size()) - 3;
+    scene.instances.push_back({object, Affine(placed({0.1 * z, 0, z}))});
+  }
+  const test::BakedScene baked(scene);
+  const Movers movers = last_instances(baked.source, 4);
+  GpuTracer tracer(baked.file, baked.source, config_, movers);
+  const std::vector<Ray> rays = test::random_rays(kRays, baked.source.world_bounds(), tracer.space(), 3);
+  const Affine before = baked.source.instances()[movers.instances[0]].world_from_object;
+  for (const Affine& place : {kFlat, before}) {
+    tracer.place_instances(std::span(movers.instances).first(1), {&place, 1});
+    expect_same(tracer, rays, kRays / 10);
+  }
+  const std::vector<Affine> all_flat(4, kFlat);
+  tracer.place_instances(movers.instances, all_flat);
+  expect_same(tracer, rays, 0);
+}
+
+/// Whether there is a tree over placements changes with their number.
+TEST_F(GpuTracerTest, InstancesThatLeaveASinglePlacement) {
+  Scene scene = sphere_scene();
+  add_object(scene, test::sphere({0, 0, 0}, 1, 16));
+  for (const double x : {-2.5, 2.5}) scene.instances.push_back({0, Affine(placed({x, 0, 0}))});
+  const test::BakedScene baked(scene);
+  const Movers movers = last_instances(baked.source, 2);
+  GpuTracer tracer(baked.file, baked.source, config_, movers);
+  const std::vector<Ray> rays = test::random_rays(kRays, baked.source.world_bounds(), tracer.space(), 3);
+  const std::vector<Affine> flat(2, kFlat);
+  tracer.place_instances(movers.instances, flat);
+  EXPECT_TRUE(tracer.packed().placed_trees().top_nodes().empty());
+  expect_same(tracer, rays, kRays / 20);
+  const Affine back[] = {Affine(placed({0, 2, 0})), Affine(placed({0, -2, 0}))};
+  tracer.place_instances(movers.instances, back);
+  EXPECT_FALSE(tracer.packed().placed_trees().top_nodes().empty());
+  expect_same(tracer, rays, kRays / 10);
 }
 
 TEST_F(GpuTracerTest, LevelsOfDetail) {
