@@ -170,6 +170,9 @@ private:
       report_.world_step = world_grid_.step();
       report_.world_median_edge = measure_.world.median_edge;
     }
+    if (choice.false_lattices > 0)
+      warn(std::to_string(choice.false_lattices) +
+           " meshes have positions off the lattice that they state; it is ignored");
     uint64_t coarse = 0, far = 0;
     for (size_t i = 0; i < grids_.size(); ++i) {
       const GeometryMeasure& measure = measure_.geometries[i];

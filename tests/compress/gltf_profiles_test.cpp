@@ -212,6 +212,34 @@ TEST(GltfRoundTrip, LatticesOfIntegersWithNamesAreEqual) {
   expect_same_after_export(file, gltf_profile(GltfProfile::kWeb));
 }
 
+/// Draco decodes what is near 0 with the rounding errors of what is far from it.
+TEST(GltfRoundTrip, LatticesOfSmallMeshesInLargeWorldsAreEqual) {
+  Scene scene;
+  add_stated(scene, 0x1p-10, {{1, 0, 0}, {101, 7, 0}, {0, 103, 5}});
+  add_stated(scene, 0x1p-10, {{-54331, 1, 77777}, {-54321, -60000, 3}, {1234, -54387, 3}});
+  const BakedScene baked = bake_for_shading(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(steps_of(file), (std::vector<double>{0x1p-10, 0x1p-10}));
+  for (const GltfProfile profile : {GltfProfile::kPortable, GltfProfile::kExchange})
+    expect_same_after_export(file, gltf_profile(profile));
+}
+
+TEST(GltfRoundTrip, FalseLatticesAreIgnored) {
+  for (const float corner : {5.0f, 5.25f}) {
+    Scene scene;
+    add_stated(scene, 1.0, {{0, 0, 0}, {100, 0, 0}, {0, 100, corner}});
+    BakeConfig config;
+    Diagnostics diagnostics;
+    Progress progress;
+    const BakedScene baked = bake_to_bytes(scene, config, diagnostics, progress);
+    const auto warned = std::ranges::count_if(baked.report.warnings, [](const std::string& warning) {
+      return warning.find("off the lattice that they state") != std::string::npos;
+    });
+    EXPECT_EQ(warned, corner == 5.0f ? 0 : 1);
+    EXPECT_EQ(steps_of(BakedFile::from_bytes(baked.bytes))[0] == 1.0, corner == 5.0f);
+  }
+}
+
 /// Each mesh lies within a frame, but no frame holds both, though their extent takes no more bits than the first's.
 TEST(GltfWeb, MeshesWithoutCommonFrameStayApart) {
   Scene scene;

@@ -66,6 +66,7 @@ private:
   /// Chooses the grids that config asks for, including finer ones for small things.
   void begin() {
     if (may_refine()) stated_ = stated_grids(scene_, plan_);
+    out_.false_lattices = stated_.false_lattices;
     if (stated_.world) {
       out_.world = *stated_.world;
       for (size_t g = 0; g < out_.grids.size(); ++g)

@@ -30,6 +30,8 @@ struct GridChoice {
   uint64_t nested_geometries = 0;
   /// Geometries whose steps are finer than the median edge requires, because images need it.
   uint64_t finer_geometries = 0;
+  /// Meshes with positions off the lattice that they state (stated_grids()).
+  uint64_t false_lattices = 0;
   std::vector<Shortfall> shortfalls;
 };
 

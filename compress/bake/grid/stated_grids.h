@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -14,11 +15,13 @@ struct StatedGrids {
   /// steps are powers of two apart.
   std::optional<PositionGrid> world;
   std::vector<std::optional<PositionGrid>> grids; ///< per geometry
+  uint64_t false_lattices = 0; ///< meshes with positions off the lattice that they state, which does not count
 };
 
 /// Finds the lattices on which the positions of geometries already lie, so that baking an export gives the positions of
-/// the file that was exported. A geometry has one if all its meshes state it, and their maps into the geometry keep it:
-/// a uniform scale that gives a step of PositionGrid, mirrored or not, and a translation by whole steps.
+/// the file that was exported. A geometry has one if all its meshes state it, their positions lie on it up to an
+/// eighth of a step or the rounding of floats at the largest coordinate of its step, and their maps into the geometry
+/// keep it: a uniform scale that gives a step of PositionGrid, mirrored or not, and a translation by whole steps.
 StatedGrids stated_grids(const Scene& scene, const ScenePlan& plan);
 
 } // namespace packtrace
