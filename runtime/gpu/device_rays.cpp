@@ -216,13 +216,19 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watc
     throw Error(ErrorKind::kUnsupported, "backend gpu: counting occluded rays needs subgroups of 4 to 32 lanes and at "
                                          "most 2^24 nodes");
   s.follow_scene();
-  s.make_room(s.counts, uint64_t{s.point_count} * sizeof(uint32_t), "counts");
+  s.make_room(s.counts, (uint64_t{s.point_count} + 1) * sizeof(uint32_t), "counts");
   s.device->fill(s.counts, 0);
   if (!s.queue_kernel) s.make_queue_kernel();
   s.queue_kernel->bind(kFirstBinding, s.points);
   s.queue_kernel->bind(kFirstBinding + 1, s.counts);
   const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };
-  return s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_pace[samples.order], threads, watch);
+  const DeviceTime time = s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_pace[samples.order], threads, watch);
+  uint32_t lost = 0;
+  download(s.device, s.counts, s.counts.bytes() - sizeof lost, std::as_writable_bytes(std::span(&lost, 1)));
+  if (lost != 0)
+    throw Error(ErrorKind::kUnsupported, "backend gpu: " + s.device->name() +
+                                             " ended a kernel before all rays were traced; use --backend packed");
+  return time;
 }
 
 DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& watch) {

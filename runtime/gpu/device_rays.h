@@ -37,7 +37,7 @@ public:
   /// Whether the device can run count_occluded(): subgroups of 4 to 32 lanes, and at most 2^24 nodes.
   bool can_count() const;
   /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
-  /// Throws Error(kUnsupported) unless can_count().
+  /// Throws Error(kUnsupported) unless can_count(), and if a kernel's loop ended early.
   DeviceTime count_occluded(const OcclusionRecord& samples, const Watch& watch = {});
   /// Sums visibility and distance of the nearest hits of each point's rays up, in the order of the samples.
   DeviceTime sum_nearest(const OcclusionRecord& samples, const Watch& watch = {});

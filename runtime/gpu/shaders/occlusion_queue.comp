@@ -24,7 +24,7 @@ const uint kGroup = 64u, kPlaces = 2u; // threads; places of the queue per lane
 layout(constant_id = 9) const uint kCorners = 8u;
 
 layout(local_size_x = 64) in;
-layout(std430, binding = 10) buffer Counts { uint counts[]; };
+layout(std430, binding = 10) buffer Counts { uint counts[]; }; // the last word: 1 if some ray was not traced
 
 shared uint s_queue[kGroup * kPlaces];     // node << 8 | lane << 3 | slot
 shared uint s_corner[kGroup * kCorners * 3]; // floats; before there are any: which lane has a leaf
@@ -330,6 +330,7 @@ void main() {
       alive = s < end;
     }
   }
+  if (alive || tracing || pending) atomicMax(counts[counts.length() - 1], 1u);
   if (!valid) return;
   if (occluded != 0u) atomicAdd(counts[number], occluded);
 }
