@@ -130,6 +130,8 @@ void Document::parse(std::string_view text) {
                     context_.feed.reporter().locate({file_number_, static_cast<uint32_t>(line),
                                                      static_cast<uint32_t>(std::max<size_t>(column, 1))}),
                     "malformed JSON");
+  } catch (const nlohmann::json::out_of_range&) {
+    fail("a number in the JSON text is too large");
   }
   if (!json_.is_object()) fail("the JSON text is not an object");
 }

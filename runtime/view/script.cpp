@@ -107,6 +107,8 @@ std::vector<ScriptLine> parse_script(std::string_view text, const std::string& n
       parsed.fields = nlohmann::json::parse(line);
     } catch (const nlohmann::json::parse_error& error) {
       fail_in_script(name, number, fmt::format("column {}: not JSON", error.byte));
+    } catch (const nlohmann::json::out_of_range&) {
+      fail_in_script(name, number, "a number is too large");
     }
     if (!parsed.fields.is_object()) fail_in_script(name, number, "must be an object, such as {\"frames\": 8}");
     parsed.action = action_of(parsed.fields, name, number);

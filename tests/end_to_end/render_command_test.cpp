@@ -292,7 +292,7 @@ TEST(CommandLine, TexturesOfTheFileLookLikeThoseOfTheScene) {
   EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "t.v16"}).exit_code, 6) << "it is there already";
   EXPECT_EQ(run_packtrace({"export", directory / "t.v16", "-o", directory / "u.v16"}).exit_code, 3);
   EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "u.v16", "--layout", "obj"}).exit_code, 2);
-  EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "u.obj"}).exit_code, 2) << "which layout?";
+  EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "u.xyz"}).exit_code, 2) << "which layout?";
   EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "u.v16", "--level", "3"}).exit_code, 2) << "of gltf";
   EXPECT_EQ(run_packtrace({"bake", scene, "-o", baked, "--force", "--texture-psnr", "40"}).exit_code, 2);
   EXPECT_EQ(run_packtrace({"bake", scene, "-o", baked, "--force", "--textures", "bc1"}).exit_code, 2) << "not for ao";

@@ -321,6 +321,7 @@ TEST(GltfProblems, EndTheImportWhereNothingIsLeft) {
     }
   };
   fails("{\n \"asset\": {,}\n}", ErrorKind::kInput, "a.gltf:2:12: malformed JSON");
+  fails("{\"asset\": {\"version\": 1e400}}", ErrorKind::kInput, "a number in the JSON text is too large");
   fails("[]", ErrorKind::kInput, "a.gltf: the JSON text is not an object");
   fails("{}", ErrorKind::kInput, "a.gltf: the document lacks asset");
   fails(R"({"asset": {"version": "1.0"}})", ErrorKind::kUnsupported, "only version 2 is read");

@@ -75,6 +75,7 @@ TEST(Script, MistakesAreNamedWithLineFieldAndNearestName) {
       {"{\"frames\": 0}", "a.jsonl:1: frames: must be a whole number from 1"},
       {"{\"frames\": 1.5}", "a.jsonl:1: frames: must be a whole number"},
       {"\n{\"frames\": }", "a.jsonl:2: column 12: not JSON"},
+      {"{\"frames\": 1e400}", "a.jsonl:1: a number is too large"},
       {"[1]", "a.jsonl:1: must be an object"},
       {"{}", "a.jsonl:1: no action; actions are frames, still"},
       {"{\"still\": 1, \"pick\": [0, 0]}", "a.jsonl:1: pick and still: a line has one action"},
