@@ -17,7 +17,8 @@ struct WordSetting {
   void (*set)(FrameConfig& config, std::string_view word); ///< the word must be one of `words`
 };
 
-/// ao-resolution, ao-rate, ao-sampler, denoiser and tone-map. The only description of them: options, help and the viewer use it.
+/// ao-resolution, ao-rate, ao-sampler, denoiser and tone-map. The only description of them: options, help and the
+/// viewer use it.
 std::span<const WordSetting> word_settings();
 
 /// The one with this name, which must exist.

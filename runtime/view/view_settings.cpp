@@ -10,8 +10,8 @@
 namespace packtrace {
 namespace {
 
-constexpr std::string_view kToneMap = "tone-map", kAoPrefix = "ao.", kDenoiserPrefix = "denoiser.", kShadePrefix = "shade.",
-                           kExposure = "exposure", kSeed = "seed";
+constexpr std::string_view kToneMap = "tone-map", kAoPrefix = "ao.", kDenoiserPrefix = "denoiser.",
+                           kShadePrefix = "shade.", kExposure = "exposure", kSeed = "seed";
 
 std::string value_text(bool is_switch, double value) {
   if (is_switch) return value != 0.0 ? "on" : "off";

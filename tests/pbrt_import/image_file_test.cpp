@@ -165,9 +165,9 @@ TEST(ImageFormats, ThoseThatAreNotReadAreNamed) {
   for (const auto& [magic, name] :
        {std::pair{"8BPS"s, "Photoshop"}, {"BM"s, "BMP"}, {"GIF89a"s, "GIF"}, {"II*\0"s, "TIFF"}, {"MM\0*"s, "TIFF"}})
     EXPECT_EQ(complaint(magic + std::string(100, '\0')),
-              "images in " + std::string(name) + " format are not read, only PNG, JPEG, TGA, EXR, PFM and HDR");
+              "images in " + std::string(name) + " format are not read, only PNG, JPEG, WebP, TGA, EXR, PFM and HDR");
   for (const std::string& file : {""s, "text"s, "\xff\xd8"s})
-    EXPECT_EQ(complaint(file), "not an image in a known format (PNG, JPEG, TGA, EXR, PFM, HDR)");
+    EXPECT_EQ(complaint(file), "not an image in a known format (PNG, JPEG, WebP, TGA, EXR, PFM, HDR)");
 }
 
 TEST(ImageFormats, WhatFuzzingFoundIsRefused) {

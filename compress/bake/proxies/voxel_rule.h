@@ -7,7 +7,7 @@ namespace packtrace {
 /// Which voxels a triangle sets.
 enum class VoxelRule : uint32_t {
   kConservative, ///< every closed voxel that it touches
-  kSeparating,         ///< 6-separating: no path through faces of empty voxels crosses the surface
+  kSeparating,   ///< 6-separating: no path through faces of empty voxels crosses the surface
 };
 
 } // namespace packtrace
