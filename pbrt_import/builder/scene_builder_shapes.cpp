@@ -104,7 +104,8 @@ bool SceneBuilder::make_ply_mesh(const Directive& directive, Shape& shape) {
   if (path.empty()) return false;
   const auto slot = static_cast<uint32_t>(scene_.meshes.size());
   shape.mesh = loader_.request_ply(path, directive.place, slot);
-  if (shape.mesh == slot) scene_.meshes.emplace_back().lattice = read_lattice(directive);
+  const LatticeStep lattice = read_lattice(directive); // that of the file's first use counts
+  if (shape.mesh == slot) scene_.meshes.emplace_back().lattice = lattice;
   return true;
 }
 
