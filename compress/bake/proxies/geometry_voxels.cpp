@@ -152,9 +152,9 @@ private:
     constexpr float kNone = std::numeric_limits<float>::infinity();
     const double edge = grid_.edge_steps();
     const VoxelNumbers numbers(result_.set);
-    const MemoryReservation memory(
-        budget_, numbers.count() * (sizeof(float) + (config_.materials ? sizeof(result_.slots[0]) : 0)),
-        "the set voxels of " + what_);
+    // Surface voxels are within working_bytes().
+    const uint64_t bytes = numbers.count() * (sizeof(float) + (config_.materials ? sizeof(result_.slots[0]) : 0));
+    const MemoryReservation memory(budget_, result_.filled ? bytes : 0, "the filled voxels of " + what_);
     std::vector<float> distances(static_cast<size_t>(numbers.count()), kNone); // inside: nothing sets them
     if (config_.materials) result_.slots.resize(distances.size());
     for_each_pair([&](const OccludingTriangle& t, VoxelIndex v) {
