@@ -85,6 +85,7 @@ set(packtrace_public_headers
   runtime/image/metrics.h
   runtime/image/png.h
   runtime/image/read_image.h
+  runtime/image/tone_map.h
   runtime/lod/lod_cut.h
   runtime/lod/lod_geometry.h
   runtime/lod/lod_metric.h
