@@ -5,7 +5,11 @@
 #include <iterator>
 #include <stdexcept>
 
+#ifdef PACKTRACE_VOLK // volk's function pointers have the names of the loader's functions
+#include "runtime/gpu/device/vulkan_api.h"
+#else
 #include <vulkan/vulkan.h>
+#endif
 
 namespace packtrace::test {
 namespace {
@@ -55,7 +59,13 @@ struct VulkanCompute::State {
     VkInstanceCreateInfo create{};
     create.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
     create.pApplicationInfo = &application;
+#ifdef PACKTRACE_VOLK
+    if (volkInitialize() != VK_SUCCESS) return false;
+#endif
     if (vkCreateInstance(&create, nullptr, &instance) != VK_SUCCESS) return false;
+#ifdef PACKTRACE_VOLK
+    volkLoadInstance(instance);
+#endif
     uint32_t count = 0;
     vkEnumeratePhysicalDevices(instance, &count, nullptr);
     std::vector<VkPhysicalDevice> devices(count);
