@@ -111,7 +111,9 @@ set(packtrace_public_headers
   runtime/shade/light_set.h
   runtime/shade/path_tracer.h
   runtime/shade/shade_config.h
+  runtime/shade/hit_surfaces.h
   runtime/shade/shade_scene.h
+  runtime/shade/shadow_rays.h
   runtime/trace/embree/embree_tracer.h
   runtime/trace/make_tracer.h
   runtime/trace/movers.h
