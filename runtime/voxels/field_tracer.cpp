@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pbrt_import/scene/math.h"
 #include "runtime/ao/hemisphere.h"
 
 namespace packtrace {
@@ -19,28 +20,32 @@ glm::vec3 FieldTracer::gradient(glm::vec3 p) const {
   return length > 0.0f ? g / length : g;
 }
 
-std::optional<FieldHit> FieldTracer::first_hit(glm::vec3 origin, glm::vec3 direction, float t_min, float t_max) const {
-  float enter = t_min, leave = t_max;
+std::optional<FieldHit> FieldTracer::first_hit(glm::dvec3 origin, glm::dvec3 direction, double t_min,
+                                               double t_max) const {
+  double enter = t_min, leave = t_max;
   for (int a = 0; a < 3; ++a) {
-    const float last = static_cast<float>(field_->size()[static_cast<size_t>(a)] - 1);
-    if (direction[a] == 0.0f) {
-      if (!(origin[a] >= 0.0f && origin[a] <= last)) return std::nullopt;
+    const double last = field_->size()[static_cast<size_t>(a)] - 1.0;
+    if (direction[a] == 0.0) {
+      if (!(origin[a] >= 0.0 && origin[a] <= last)) return std::nullopt;
       continue;
     }
-    const float x = -origin[a] / direction[a], y = (last - origin[a]) / direction[a];
+    const double x = -origin[a] / direction[a], y = (last - origin[a]) / direction[a];
     enter = std::max(enter, std::min(x, y)), leave = std::min(leave, std::max(x, y));
   }
+  const glm::vec3 start(origin + enter * direction), way(direction);
+  if (!(enter <= leave) || !is_finite(start)) return std::nullopt;
+  const auto length = static_cast<float>(leave - enter);
   // Interpolated distances may exceed the true ones a little: shorter steps do not pass through thin things.
   constexpr float kCaution = 0.85f, kLeastStep = 0.02f;
-  for (float t = enter; t <= leave;) {
-    const glm::vec3 p = origin + t * direction;
+  for (float t = 0.0f; t <= length;) {
+    const glm::vec3 p = start + t * way;
     const float signed_distance = field_->distance(p),
                 distance = has_sign_ ? signed_distance : std::abs(signed_distance);
     if (distance < (has_sign_ ? kSurface : kUnsignedSurface)) {
       glm::vec3 normal = gradient(p);
-      if (normal == glm::vec3(0.0f)) normal = -direction; // deep inside, where all stored distances are equal
-      if (glm::dot(normal, direction) > 0.0f) normal = -normal;
-      return FieldHit{t, normal};
+      if (normal == glm::vec3(0.0f)) normal = -way; // deep inside, where all stored distances are equal
+      if (glm::dot(normal, way) > 0.0f) normal = -normal;
+      return FieldHit{enter + double{t}, normal};
     }
     t += std::max(kCaution * distance, kLeastStep);
   }

@@ -10,7 +10,7 @@ namespace packtrace {
 
 /// Where a ray meets the surface of a distance field.
 struct FieldHit {
-  float t;
+  double t;
   glm::vec3 normal; ///< unit: the field's gradient, towards the ray's origin
 };
 
@@ -24,8 +24,9 @@ public:
   /// Sphere tracing: steps as far as nothing can be near, until the distance is below kSurface, or
   /// kUnsignedSurface without signs, where interpolated distances do not reach 0 between samples.
   /// Source: Hart, "Sphere Tracing", 1996.
+  /// The steps are floats from where the ray enters the field, however far its origin is.
   /// @param direction of unit length
-  std::optional<FieldHit> first_hit(glm::vec3 origin, glm::vec3 direction, float t_min, float t_max) const;
+  std::optional<FieldHit> first_hit(glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) const;
 
   /// Ambient occlusion from five taps along the normal, which compare the distance to the surface with the way there.
   /// Source: Evans, "Fast Approximations for Global Illumination on Dynamic Scenes", 2006.

@@ -32,22 +32,11 @@ struct ProxyHit {
 
 std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction, double t_min, double t_max) {
   if (proxy.is_field()) {
-    // The tracer's floats start where the ray enters the field, however far its origin is.
     const double length = glm::length(direction);
-    const DVec3 way = direction / length;
-    double enter = t_min * length, leave = t_max * length;
-    for (int a = 0; a < 3; ++a) {
-      const double last = proxy.field.size()[static_cast<size_t>(a)] - 1.0;
-      if (way[a] == 0.0) continue; // the tracer compares the origin
-      const double x = -origin[a] / way[a], y = (last - origin[a]) / way[a];
-      enter = std::max(enter, std::min(x, y)), leave = std::min(leave, std::max(x, y));
-    }
-    const DVec3 start = origin + enter * way;
-    if (!(enter <= leave) || !is_finite(Vec3(start))) return std::nullopt;
     const FieldTracer tracer(proxy.field, (proxy.record.flags & voxels::kSigned) != 0);
-    const auto hit = tracer.first_hit(glm::vec3(start), glm::vec3(way), 0.0f, static_cast<float>(leave - enter));
+    const auto hit = tracer.first_hit(origin, direction / length, t_min * length, t_max * length);
     if (!hit) return std::nullopt;
-    const double t = (enter + double{hit->t}) / length;
+    const double t = hit->t / length;
     if (!(t < t_max)) return std::nullopt;
     return ProxyHit{t, {}, DVec3(hit->normal)};
   }

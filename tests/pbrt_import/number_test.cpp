@@ -12,15 +12,12 @@
 #include <type_traits>
 
 #include <gtest/gtest.h>
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
 
-#ifdef PACKTRACE_SANITIZED
-constexpr uint64_t kShare = 50; // sanitizers slow each value down by more than ten times
-#else
-constexpr uint64_t kShare = 1;
-#endif
+constexpr uint64_t kShare = test::kSanitized ? 50 : 1; // they slow each value down by more than ten times
 
 /// Numbers of values in all tests together, without sanitizers.
 constexpr uint64_t kRandomBits = 4'000'000, kDecimals = 4'000'000, kHalfway = 1'200'000, kEdges = 500'000,

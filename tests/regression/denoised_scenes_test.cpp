@@ -12,6 +12,7 @@
 #include <tbb/global_control.h>
 
 #include "tests/regression/denoised_scene.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::test {
 
@@ -29,11 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-#ifdef PACKTRACE_SANITIZED
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 constexpr ImageSize kSize{96, 54};
 constexpr uint32_t kTruthSpp = 128; ///< of moving views, whose errors are large

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/regression/scene_metrics.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::test {
 namespace {
@@ -29,11 +30,6 @@ constexpr const char* kGroup = "shared";
 constexpr const char* kGroup = "assets";
 #endif
 
-#ifdef PACKTRACE_SANITIZED
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 /// Folder of the scenes; empty if $PACKTRACE_SCENES is not set.
 fs::path root() {

@@ -13,6 +13,15 @@
 
 namespace packtrace {
 
+/// The `width` bits, at most 32, from `bit` on.
+inline uint32_t read_packed(const uint32_t* words, uint64_t bit, uint32_t width) {
+  const uint32_t* const at = words + bit / 32;
+  const uint32_t shift = bit % 32;
+  uint64_t value = at[0];
+  if (shift + width > 32) value |= uint64_t{at[1]} << 32;
+  return static_cast<uint32_t>(value >> shift & ((uint64_t{1} << width) - 1));
+}
+
 /// Voxels as a tree of bits without pointers that any voxel can be read from: occupancy_format.h describes the words.
 class OccupancyStream {
 public:
@@ -75,11 +84,7 @@ public:
     return rank + static_cast<uint64_t>(std::popcount(words_[word] & ((1u << (bit % 32)) - 1)));
   }
   uint32_t read_field(uint64_t word, uint64_t bit, uint32_t width) const {
-    word += bit / 32;
-    const uint32_t shift = bit % 32;
-    uint64_t value = words_[word];
-    if (shift + width > 32) value |= uint64_t{words_[word + 1]} << 32;
-    return static_cast<uint32_t>(value >> shift & ((uint64_t{1} << width) - 1));
+    return read_packed(words_.data() + word, bit, width);
   }
 
 private:

@@ -105,32 +105,26 @@ private:
 
   std::optional<std::string_view> pointers(uint32_t l) {
     const OccupancyLevel& level = header_.level[l];
-    const uint64_t edges = header_.level[l - 1].set_bits, bits = edges * level.pointer_bits;
-    std::span<const uint32_t> part;
-    if (!take(words_for_bits(bits), part)) return "pointers end early";
-    if (!zero_tail(part, bits)) return "bits behind the pointers";
-    for (uint64_t e = 0; e < edges; ++e) {
-      const uint64_t bit = e * level.pointer_bits, word = bit / 32;
-      uint64_t value = part[static_cast<size_t>(word)];
-      if (bit % 32 + level.pointer_bits > 32) value |= uint64_t{part[static_cast<size_t>(word + 1)]} << 32;
-      value = value >> (bit % 32) & ((uint64_t{1} << level.pointer_bits) - 1);
-      if (value >= level.mask_bits / 8) return "pointer";
-    }
-    return std::nullopt;
+    return packed(header_.level[l - 1].set_bits, level.pointer_bits, level.mask_bits / 8,
+                  {"pointers end early", "bits behind the pointers", "pointer"});
   }
 
   std::optional<std::string_view> swatches() {
     if (header_.swatch_bits == 0) return std::nullopt;
-    const uint64_t count = header_.level[header_.levels - 1].set_bits, bits = count * header_.swatch_bits;
+    return packed(header_.level[header_.levels - 1].set_bits, header_.swatch_bits, header_.palette_count,
+                  {"swatches end early", "bits behind the swatches", "swatch"});
+  }
+
+  struct PackedFaults {
+    std::string_view short_part, tail, value;
+  };
+  /// Takes `count` packed values, which must be below `limit`.
+  std::optional<std::string_view> packed(uint64_t count, uint32_t width, uint64_t limit, const PackedFaults& faults) {
     std::span<const uint32_t> part;
-    if (!take(words_for_bits(bits), part)) return "swatches end early";
-    if (!zero_tail(part, bits)) return "bits behind the swatches";
-    for (uint64_t i = 0; i < count; ++i) {
-      const uint64_t bit = i * header_.swatch_bits, word = bit / 32;
-      uint64_t value = part[static_cast<size_t>(word)];
-      if (bit % 32 + header_.swatch_bits > 32) value |= uint64_t{part[static_cast<size_t>(word + 1)]} << 32;
-      if ((value >> (bit % 32) & ((uint64_t{1} << header_.swatch_bits) - 1)) >= header_.palette_count) return "swatch";
-    }
+    if (!take(words_for_bits(count * width), part)) return faults.short_part;
+    if (!zero_tail(part, count * width)) return faults.tail;
+    for (uint64_t i = 0; i < count; ++i)
+      if (read_packed(part.data(), i * width, width) >= limit) return faults.value;
     return std::nullopt;
   }
 

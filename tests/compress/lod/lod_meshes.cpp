@@ -11,6 +11,7 @@
 #include "compress/bake/plan/requirements.h"
 #include "pbrt_import/base/progress.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::test {
 
@@ -181,11 +182,7 @@ Mesh triangles_around_an_edge() {
 }
 
 /// Triangles of the soup, of which no two merge: errors of its levels take long to measure under sanitizers.
-#ifdef PACKTRACE_SANITIZED
-constexpr uint32_t kSoup = 1500;
-#else
-constexpr uint32_t kSoup = 6000;
-#endif
+constexpr uint32_t kSoup = test::kSanitized ? 1500 : 6000;
 
 } // namespace
 

@@ -9,6 +9,7 @@
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/denoise/denoiser.h"
 #include "tests/runtime/trace/moving_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -86,15 +87,8 @@ std::vector<size_t> still_pixels(const GBuffer& g, uint32_t box) {
   return pixels;
 }
 
-/// Errors of pictures take many rays; the other tests run the same code under sanitizers.
-#ifdef PACKTRACE_SANITIZED
-constexpr bool kTooSlow = true;
-#else
-constexpr bool kTooSlow = false;
-#endif
-
 TEST_F(OccluderTest, LeavesLittleOcclusionBehind) {
-  if (kTooSlow) GTEST_SKIP() << "too slow under sanitizers";
+  if (test::kSanitized) GTEST_SKIP() << "other tests run the same code under sanitizers with fewer rays";
   GBuffer g;
   AoFrame truth_before, truth, noisy;
   trace(1000, 256, kLow, kLow, g, truth_before);
@@ -140,7 +134,7 @@ struct SlidingErrors {
 };
 
 TEST_F(OccluderTest, MovesOnWithItsOcclusion) {
-  if (kTooSlow) GTEST_SKIP() << "too slow under sanitizers";
+  if (test::kSanitized) GTEST_SKIP() << "other tests run the same code under sanitizers with fewer rays";
   GBuffer g;
   AoFrame truth, noisy;
   constexpr uint32_t kStart = 24, kFirst = 40, kEnd = 48;

@@ -7,6 +7,7 @@
 #include "tests/runtime/trace/embree_cluster_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -18,11 +19,7 @@ using test::closest;
 constexpr size_t kManyRays = 1'000'000, kRaysPerPrecision = 100'000;
 
 /// One ray of so many is traced: they are slow under sanitizers, and builds without them find rare leaks.
-#ifdef PACKTRACE_SANITIZED
-constexpr size_t kRayShare = 10;
-#else
-constexpr size_t kRayShare = 1;
-#endif
+constexpr size_t kRayShare = test::kSanitized ? 10 : 1;
 
 /// Rays from inside a closed mesh to its vertices, to points on its edges and elsewhere, and along the axes. All must
 /// hit.
