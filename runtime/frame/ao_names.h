@@ -13,7 +13,8 @@ namespace packtrace {
 template <typename T, size_t kCount>
 using NamedValues = std::array<std::pair<const char*, T>, kCount>;
 
-// Names of the ways to spend occlusion rays and to display radiance, as users give them; the first is the default.
+// Values of the options that choose how occlusion rays are spent and how radiance is displayed; the first is the
+// default.
 inline constexpr NamedValues<AoResolution, 2> kAoResolutionNames{
     {{"full", AoResolution::kFull}, {"quarter", AoResolution::kQuarter}}};
 inline constexpr NamedValues<AoRate, 3> kAoRateNames{

@@ -46,10 +46,10 @@ public:
   void release();
 
   uint32_t point_count() const;
-  /// By pixel, of trace_camera().
+  /// Downloads the results of trace_camera(), one per pixel.
   void hits(std::span<packed::KernelHit> out) const;
   void rays(std::span<packed::KernelRay> out) const;
-  /// By point.
+  /// Downloads one value per surface point.
   void points(std::span<PointRecord> out) const;
   void counts(std::span<uint32_t> out) const;
   /// By point, of sum_nearest(): visibility and distance, two each.

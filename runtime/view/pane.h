@@ -54,7 +54,7 @@ public:
   void next_frame(const Camera& camera, double time_s, Progress& progress);
   /// Writes image() from the frames so far, with the layers of the configuration.
   void resolve();
-  /// Adds the FrameConfig::plain_layers that resolve() left out.
+  /// Computes the layers of FrameConfig::plain_layers that resolve() skipped, because nothing showed them.
   void complete();
 
   const RenderedImage& image() const { return image_; }

@@ -11,8 +11,8 @@
 #include <string>
 #include <type_traits>
 
-#include <gtest/gtest.h>
 #include "tests/sanitized.h"
+#include <gtest/gtest.h>
 
 namespace packtrace {
 namespace {

@@ -30,7 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-
 constexpr ImageSize kSize{96, 54};
 constexpr uint32_t kTruthSpp = 128; ///< of moving views, whose errors are large
 constexpr uint32_t kStillTruthSpp = kSanitized ? 64 : 1024;

@@ -30,7 +30,6 @@ constexpr const char* kGroup = "shared";
 constexpr const char* kGroup = "assets";
 #endif
 
-
 /// Folder of the scenes; empty if $PACKTRACE_SCENES is not set.
 fs::path root() {
 #ifdef PACKTRACE_SHARED_SCENES

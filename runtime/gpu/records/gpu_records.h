@@ -66,7 +66,7 @@ struct PointRecord {
 };
 inline constexpr uint32_t kNoPoint = ~0u;
 
-/// A part of the points and samples of a picture.
+/// A range of surface points and a range of the samples of each.
 struct OcclusionRecord {
   uint32_t first_point, point_count;
   uint32_t first_sample, sample_count; ///< numbers in the pixels' sequences

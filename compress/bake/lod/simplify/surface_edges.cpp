@@ -27,7 +27,7 @@ struct EdgeUse {
   bool forward;      ///< whether that triangle runs from the lower-numbered point
   bool border = true, seam = false, crease = false;
   bool two = false;   ///< at least two triangles use it
-  bool sharp = false; ///< exactly two use it, and the surface turns sharply there
+  bool sharp = false; ///< exactly two triangles use it, and their normals differ by a large angle
 };
 
 class EdgeFinder {
