@@ -29,6 +29,13 @@ enum class HistorySource : uint8_t {
   kUnchanged,
 };
 
+/// Time of a pass on a GPU.
+struct DenoiserPassTime {
+  const char* name;
+  double ms;
+  uint32_t bytes_per_pixel; ///< that the pass must read and write, whatever the picture
+};
+
 /// One of the denoisers behind AoDenoiser, which checks the arguments and describes the functions.
 class DenoisePipeline {
 public:
@@ -42,6 +49,7 @@ public:
   virtual void restore(ImageSize size, std::span<const std::byte> bytes) = 0;
   virtual void reset() = 0;
   virtual size_t state_bytes() const = 0;
+  virtual std::vector<DenoiserPassTime> pass_times() const { return {}; }
 };
 
 } // namespace packtrace

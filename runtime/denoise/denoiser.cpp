@@ -5,6 +5,9 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/denoise/flux_pipeline.h"
 #include "runtime/denoise/reference/reference_pipeline.h"
+#if defined(PACKTRACE_HAS_GPU)
+#include "runtime/denoise/gpu/gpu_pipeline.h"
+#endif
 
 namespace packtrace {
 namespace {
@@ -28,18 +31,35 @@ void require_sizes(const GBuffer& gbuffer, const AoFrame& ao) {
                 "denoiser: the image is more than " + std::to_string(kLargestSide) + " pixels wide or high");
 }
 
-std::unique_ptr<DenoisePipeline> make_pipeline(const DenoiserConfig& config) {
+std::unique_ptr<DenoisePipeline> make_on_gpu([[maybe_unused]] const DenoiserConfig& config,
+                                             [[maybe_unused]] const GpuConfig& device) {
+  if (config.kind != DenoiserKind::kOurs)
+    throw Error(ErrorKind::kUnsupported, "backend gpu has no denoiser \"reference\"; use --backend packed");
+#if defined(PACKTRACE_HAS_GPU)
+  return make_gpu_pipeline(config.ours, device);
+#else
+  throw Error(ErrorKind::kUnsupported, "packtrace was built without backend gpu; use --backend packed");
+#endif
+}
+
+std::unique_ptr<DenoisePipeline> make_pipeline(const DenoiserConfig& config, const GpuConfig* device) {
+  if (device != nullptr) return make_on_gpu(config, *device);
   return config.kind == DenoiserKind::kReference ? make_reference_pipeline(config.reference)
                                                  : make_flux_pipeline(config.ours);
 }
 
 } // namespace
 
-AoDenoiser::AoDenoiser(const DenoiserConfig& config) : pipeline_(make_pipeline(config)) {}
+AoDenoiser::AoDenoiser(const DenoiserConfig& config, const GpuConfig* device)
+    : pipeline_(make_pipeline(config, device)) {}
 
 void AoDenoiser::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
   require_sizes(gbuffer, ao);
-  if (gbuffer.size != size_) pipeline_->resize(size_ = gbuffer.size);
+  if (gbuffer.size != size_) {
+    size_ = {}; // for the case that there is no memory
+    pipeline_->resize(gbuffer.size);
+    size_ = gbuffer.size;
+  }
   if (size_.pixels() > 0) pipeline_->add_frame(gbuffer, ao, source);
 }
 
@@ -55,5 +75,7 @@ void AoDenoiser::restore(ImageSize size, std::span<const std::byte> bytes) {
 void AoDenoiser::reset() { pipeline_->reset(); }
 
 size_t AoDenoiser::state_bytes() const { return pipeline_->state_bytes(); }
+
+std::vector<DenoiserPassTime> AoDenoiser::pass_times() const { return pipeline_->pass_times(); }
 
 } // namespace packtrace

@@ -8,6 +8,7 @@
 #include "runtime/camera/gbuffer.h"
 #include "runtime/denoise/denoise_pipeline.h"
 #include "runtime/denoise/denoiser_config.h"
+#include "runtime/gpu/gpu_config.h"
 
 namespace packtrace {
 
@@ -18,8 +19,10 @@ namespace packtrace {
 /// Results are bit-identical for any number of threads. Use one object per view, from one thread at a time.
 class AoDenoiser {
 public:
-  /// Throws Error (kUsage) if the configuration is out of range.
-  explicit AoDenoiser(const DenoiserConfig& config = {});
+  /// @param device runs the denoiser there, where its history then stays; null: on the CPU
+  /// Throws Error (kUsage) if the configuration is out of range; with a device Error (kUnsupported) for the preset
+  /// `reference`, and as opening a device does.
+  explicit AoDenoiser(const DenoiserConfig& config = {}, const GpuConfig* device = nullptr);
 
   /// Denoises the next frame. A change of the image size discards the history, as reset() does. Negative and non-finite
   /// values of `ao` mean that the pixel has no sample in this frame. A pixel with a non-finite depth counts as a miss;
@@ -53,6 +56,9 @@ public:
 
   /// Bytes of memory that are held between frames, without the result and without each thread's rows.
   size_t state_bytes() const;
+
+  /// Passes of the last add_frame() and the last denoise() on a GPU; empty on CPUs.
+  std::vector<DenoiserPassTime> pass_times() const;
 
 private:
   std::unique_ptr<DenoisePipeline> pipeline_;

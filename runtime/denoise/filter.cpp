@@ -1,22 +1,16 @@
 #include "runtime/denoise/filter.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <vector>
 
 #include <tbb/cache_aligned_allocator.h>
 #include <tbb/enumerable_thread_specific.h>
 
 #include "runtime/denoise/fill.h"
-#include "runtime/denoise/trend.h"
+#include "runtime/denoise/flux_terms.h"
 
 namespace packtrace {
 namespace {
-
-/// VarianceTerms::young of independent samples. The ratio of stratified ones has a similar effect: variances of young
-/// pixels are rather too large, so that they are filtered more.
-constexpr float kIndependentYoung = 12.0f;
 
 /// Part of the rows of an image that is filtered by itself, so that what belongs to it stays in the cache.
 struct Tile {
@@ -76,31 +70,6 @@ protected:
   RowRing<uint16_t> precision_;
 };
 
-PatchTerms patch_terms(const FluxConfig& config) {
-  const double limit = 9.0 * config.patch_limit * kDistanceUnits;
-  PatchTerms t;
-  t.no_distance = static_cast<uint16_t>(std::lround(kDistanceUnits / config.noise_tolerance));
-  t.shift = std::countl_zero(static_cast<uint16_t>(limit));
-  t.limit = static_cast<uint16_t>(std::ldexp(limit, t.shift));
-  t.stretch = static_cast<uint16_t>(65536.0 * (65535.0 / t.limit - 1.0));
-  return t;
-}
-
-VarianceTerms variance_terms(const FluxConfig& config, const FilterInput& input) {
-  VarianceTerms t;
-  t.tolerance = config.noise_tolerance, t.prior = config.variance_prior, t.distrust = config.variance_distrust,
-  t.ratio_prior = config.ratio_prior;
-  t.longest_moving = static_cast<float>(config.max_tspp_moving), t.moving = input.moving;
-  t.stratified = input.stratified;
-  t.per_sample = 1.0f / static_cast<float>(input.samples);
-  if (t.stratified)
-    t.still_factor = 0.75f, t.still_power = kStratifiedPower - 1.0f, t.moving_base = 0.55f, t.moving_gain = 0.02f;
-  else
-    t.young = kIndependentYoung;
-  t.most_spread = t.per_sample * std::min(1.0f, t.still_factor * std::pow(t.per_sample, t.still_power));
-  return t;
-}
-
 /// The history with the variance of its means, and with values for pixels without one.
 class HistoryRows final : public RowSource {
 public:
@@ -119,7 +88,7 @@ public:
 
   void begin(const FilterInput& input, int first) override {
     input_ = &input;
-    terms_ = variance_terms(config_, input);
+    terms_ = variance_terms(config_, input.moving, input.stratified, input.samples);
     next_ = std::max(first, 0);
     next_sum_ = next_ - kRadius;
   }

@@ -6,9 +6,10 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include "runtime/denoise/flux_terms.h"
+#include "runtime/denoise/kernels/trend.h"
 #include "runtime/denoise/limit_frames.h"
 #include "runtime/denoise/local_statistics.h"
-#include "runtime/denoise/trend.h"
 
 namespace packtrace {
 namespace {
@@ -35,9 +36,7 @@ public:
       : kernels_(kernels), width_(static_cast<int>(size.width)), reprojection_(size, config, kernels),
         statistics_(size.width, config.window, kernels), samples_(size, 1), discarded_(4 * size_t{size.width}),
         limited_(size.width) {
-    const float share = 1.0f / static_cast<float>(config.fast_frames);
-    terms_ = {share / (2.0f - share), config.change_gamma, config.change_tolerance, config.change_response,
-              static_cast<float>(config.fast_frames)};
+    terms_ = correct_terms(config);
   }
 
   /// The samples of row y, without changing the history.

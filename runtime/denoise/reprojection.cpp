@@ -1,17 +1,10 @@
 #include "runtime/denoise/reprojection.h"
 
-#include <algorithm>
 #include <bit>
+#include <utility>
 
+#include "runtime/denoise/flux_terms.h"
 namespace packtrace {
-namespace {
-
-/// Factor of reprojection_depth where the depths of the surfaces in the previous frame are unknown: the camera or the
-/// surfaces may have come nearer.
-constexpr float kUnknownDepthFactor = 4.0f;
-
-} // namespace
-
 ReprojectionRows::ReprojectionRows(ImageSize size, const FluxConfig& config, const HistoryKernels& kernels)
     : config_(config), kernels_(kernels), width_(static_cast<int>(size.width)) {
   const size_t padded = static_cast<size_t>(size.width) + kRunPadding;
@@ -28,14 +21,14 @@ HistoryRow ReprojectionRows::at(const MotionFrame& frame, int y) {
   const Guides &now = frame.guides, &then = frame.previous.guides;
   const History& history = frame.previous.history;
   const size_t begin = static_cast<size_t>(y) * static_cast<size_t>(width_);
-  const LocateTerms terms{config_.reprojection_depth * (frame.previous_z.empty() ? kUnknownDepthFactor : 1.0f),
+  const LocateTerms terms{located_depth(config_, !frame.previous_z.empty()),
                           config_.reprojection_slope,
                           static_cast<float>(y),
                           static_cast<float>(width_),
                           static_cast<float>(now.size.height),
                           history.mean.stride(),
                           static_cast<float>(config_.max_tspp),
-                          static_cast<float>(std::min(config_.max_tspp, config_.max_tspp_moving))};
+                          longest_moving(config_)};
   const float* previous_z = frame.previous_z.empty() ? nullptr : &frame.previous_z[begin];
   kernels_.locate(
       width_,

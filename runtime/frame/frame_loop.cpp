@@ -69,10 +69,16 @@ struct SavedLoop {
   uint64_t shade_bytes; ///< of ShadedMean
 };
 
+/// The denoiser works where rays are traced.
+AoDenoiser made_denoiser(const FrameConfig& config, const FrameScene& scene) {
+  const bool on_gpu = config.denoise && scene.backend.backend == Backend::kGpu;
+  return AoDenoiser(config.denoiser, on_gpu ? &scene.backend.gpu : nullptr);
+}
+
 } // namespace
 
 FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
-    : config_(validated(config, scene)), state_(scene, config.detail), denoiser_(config.denoiser) {}
+    : config_(validated(config, scene)), state_(scene, config.detail), denoiser_(made_denoiser(config, scene)) {}
 
 FrameLoop::~FrameLoop() = default;
 
@@ -89,7 +95,7 @@ void FrameLoop::configure(const FrameConfig& config) {
   const DetailConfig detail = config_.detail;
   config_ = validated(config, scene());
   config_.detail = detail;
-  denoiser_ = AoDenoiser(config_.denoiser);
+  denoiser_ = made_denoiser(config_, scene());
   denoised_ = nullptr;
   views_.clear();
   reset();

@@ -79,6 +79,7 @@ public:
   /// The lights and materials of shaded views; null before the first frame of one.
   const ShadeScene* shade_scene() const { return shade_scene_.get(); }
   const DetailPlanner* detail() const { return state_.planner(); }
+  const AoDenoiser& denoiser() const { return denoiser_; }
   /// Camera rays of the last frame that traced any.
   const GBuffer& gbuffer() const { return gbuffer_; }
 

@@ -1,6 +1,6 @@
 // Measures backend gpu on baked files, and compares every hit with backend packed: camera rays and ambient occlusion
 // that the device makes itself. Prints JSON. Needs no files but those given; exit code 5 if a hit differs. Usage:
-// gpu_benchmark FILE.ptk... [--size 1920x1080] [--spp 1 64 256] [--repeats 5] [--device NAME]
+// gpu_benchmark FILE.ptk... [--size 1920x1080] [--spp 1 64 256] [--repeats 5] [--device NAME] [--only-frames]
 
 #include <algorithm>
 #include <cmath>
@@ -21,6 +21,7 @@
 #include "runtime/trace/gpu/gpu_tracer.h"
 #include "runtime/trace/packed/scene/placed_trees.h"
 #include "runtime/trace/source/packed_source.h"
+#include "tests/benchmarks/gpu_frames.h"
 
 namespace packtrace {
 namespace {
@@ -36,17 +37,13 @@ struct Options {
   double radius = 0.1; ///< of the occlusion rays, in diagonals of the world
   GpuConfig gpu;
   bool exact = false;
+  bool only_frames = false;
 };
 
 ImageSize parsed_size(const std::string& text) {
   const size_t at = text.find('x');
   return {static_cast<uint32_t>(std::stoul(text.substr(0, at))),
           static_cast<uint32_t>(std::stoul(text.substr(at + 1)))};
-}
-
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values[values.size() / 2];
 }
 
 /// The camera's rays as linear functions of the pixel, in unit space.
@@ -97,13 +94,16 @@ public:
     out["device_bytes"] = tracer_.scene().bytes();
     out["bytes_per_triangle"] = double(tracer_.scene().bytes()) / double(unique_triangles());
     const ImageSize size = parsed_size(options_.size);
+    const Camera framed = framing_camera(source_.world_bounds(), size, source_.cameras());
+    const Camera seen = options_.camera < source_.cameras().size() ? source_.cameras()[options_.camera] : framed;
+    out["frames"] = measure_gpu_frames(file_, source_, seen, size, options_.gpu, options_.repeats);
+    if (options_.only_frames) return out;
     if (options_.camera < source_.cameras().size()) {
       view_ = camera_record(PrimaryCamera(source_.cameras()[options_.camera], size), tracer_.space());
       out["camera"] = run_camera();
     }
     if (!out.contains("camera") || out["camera"]["hits"] == 0) { // It sees nothing.
-      const Camera whole = framing_camera(source_.world_bounds(), size, source_.cameras());
-      view_ = camera_record(PrimaryCamera(whole, size), tracer_.space());
+      view_ = camera_record(PrimaryCamera(framed, size), tracer_.space());
       out["camera"] = run_camera();
     }
     rays_.make_points(1.0f);
@@ -263,6 +263,7 @@ int main(int argc, char** argv) {
   app.add_option("--radius", options.radius, "of occlusion rays, in diagonals of the world")->capture_default_str();
   app.add_option("--device", options.gpu.device, "part of the device's name (default: a GPU)");
   app.add_option("--dispatch-ms", options.gpu.dispatch_ms, "time that a dispatch should take")->capture_default_str();
+  app.add_flag("--only-frames", options.only_frames, "measure frames and the denoiser only");
   app.add_flag("--exact", options.exact, "make floats from doubles, whatever the device can");
   CLI11_PARSE(app, argc, argv);
   try {

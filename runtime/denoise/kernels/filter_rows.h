@@ -26,6 +26,16 @@ inline int16_t in_ao_units(float ao) {
 /// those of pixels that hit something are at least 1 unit, and 0 means a miss. 1.375 times the largest one fits.
 inline constexpr float kPrecisionUnits = 47.0f;
 
+inline constexpr float kMostPrecision = 1000.0f * kPrecisionUnits;
+
+/// 0.707 and 0.499 in units of 2^-16, per unit of a guide weight.
+inline constexpr uint16_t kStraight = 182, kDiagonal = 128;
+/// A sample unlike all its neighbours gives way by kLoneBase + kLoneYoung / n, where n is the number of samples.
+inline constexpr float kLoneBase = 0.7f, kLoneYoung = 0.3f;
+inline constexpr float kMaxVariance = 0.25f; ///< of values in [0, 1]
+/// In units of 1 / kPrecisionUnits; the sum of nine squares fits.
+inline constexpr uint16_t kMostDeviations = 240;
+
 /// What guide weights compare, for one row of pixels.
 struct SurfaceRow {
   const float *disparity, *dx, *dy; ///< dx, dy: change of the disparity per pixel

@@ -12,13 +12,6 @@
 namespace packtrace {
 namespace {
 
-/// 0.707 and 0.499 in units of 2^-16, per unit of a guide weight.
-constexpr uint16_t kStraight = 182, kDiagonal = 128;
-constexpr float kLoneBase = 0.7f, kLoneYoung = 0.3f;
-constexpr float kMaxVariance = 0.25f; // of values in [0, 1]
-constexpr float kMostPrecision = 1000.0f * kPrecisionUnits;
-constexpr uint16_t kMostDeviations = 240; // in units of 1 / kPrecisionUnits; the sum of nine squares fits
-
 /// 1 / sqrt(x) with a relative error below 0.2 %: minus half the exponent and a step of Newton's method.
 inline float reciprocal_root(float x) {
   const float r = __builtin_bit_cast(float, 0x5f375a86 - (__builtin_bit_cast(int32_t, x) >> 1));

@@ -14,6 +14,12 @@ inline constexpr int kRunPadding = 32;
 /// Offset of a pixel without history, in LocatedRow.
 inline constexpr int32_t kNoOffset = INT32_MIN;
 
+/// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
+inline constexpr float kMinHistoryWeight = 1e-3f;
+
+/// Footprints with a smaller total weight cross an edge, where sharpening would overshoot.
+inline constexpr float kMinSharpenWeight = 0.9f;
+
 /// One row of a frame, as reprojection reads it.
 struct MovingRow {
   const float *above, *here, *below; ///< disparity of three rows

@@ -15,12 +15,6 @@ namespace {
 
 constexpr float kLargest = std::numeric_limits<float>::max(), kSmallest = std::numeric_limits<float>::min();
 
-/// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
-constexpr float kMinHistoryWeight = 1e-3f;
-
-/// Footprints with a smaller total weight cross an edge, where sharpening would overshoot.
-constexpr float kMinSharpenWeight = 0.9f;
-
 /// Magnitude of the smaller one-sided difference (DepthDerivatives).
 inline float smaller_step(float before, float centre, float after) {
   const float backward = std::abs(centre - before), forward = std::abs(after - centre);

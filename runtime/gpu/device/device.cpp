@@ -1,10 +1,13 @@
 #include "runtime/gpu/device/device.h"
 
+#include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <limits>
 
 #include "pbrt_import/base/error.h"
 #include "runtime/gpu/device/buffer.h"
+#include "runtime/gpu/device/commands.h"
 #include "runtime/gpu/device/kernel.h"
 
 namespace packtrace::gpu {
@@ -20,15 +23,16 @@ void check(VkResult result, const char* call) {
 
 /// Records commands, submits them and waits. Returns their time on the device, or on CPU devices that of the host, in
 /// ms.
+/// @param times of the spans between the pairs of timestamps that `record` wrote from number 2 on
 template <typename Record>
-double Device::submit(const Record& record) {
+double Device::submit(const Record& record, std::span<double> times) {
   const std::lock_guard lock(queue_mutex_);
   check(vkResetCommandPool(device_, pool_, 0), "vkResetCommandPool");
   const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr,
                                        VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT, nullptr};
   check(vkBeginCommandBuffer(commands_, &begin), "vkBeginCommandBuffer");
   if (queries_ != VK_NULL_HANDLE) {
-    vkCmdResetQueryPool(commands_, queries_, 0, 2);
+    vkCmdResetQueryPool(commands_, queries_, 0, 2 + 2 * static_cast<uint32_t>(times.size()));
     vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, queries_, 0);
   }
   record(commands_);
@@ -54,11 +58,17 @@ double Device::submit(const Record& record) {
   check(vkResetFences(device_, 1, &fence_), "vkResetFences");
   const double wall_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count();
   if (queries_ == VK_NULL_HANDLE || on_cpu()) return wall_ms;
-  uint64_t stamps[2] = {};
-  check(vkGetQueryPoolResults(device_, queries_, 0, 2, sizeof stamps, stamps, sizeof stamps[0],
+  std::vector<uint64_t> stamps(2 + 2 * times.size());
+  check(vkGetQueryPoolResults(device_, queries_, 0, static_cast<uint32_t>(stamps.size()),
+                              stamps.size() * sizeof stamps[0], stamps.data(), sizeof stamps[0],
                               VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
         "vkGetQueryPoolResults");
-  return static_cast<double>((stamps[1] - stamps[0]) & stamp_mask_) * double{limits().timestampPeriod} * 1e-6;
+  const auto span_ms = [&](size_t first) {
+    return static_cast<double>((stamps[first + 1] - stamps[first]) & stamp_mask_) * double{limits().timestampPeriod} *
+           1e-6;
+  };
+  for (size_t i = 0; i < times.size(); ++i) times[i] = span_ms(2 + 2 * i);
+  return span_ms(0);
 }
 
 double Device::run(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups) {
@@ -70,6 +80,50 @@ double Device::run(const Kernel& kernel, std::span<const std::byte> push, uint32
                          push.data());
     vkCmdDispatch(commands, groups, 1, 1);
   });
+}
+
+/// Records commands with a barrier before each dispatch, and before the first copy behind dispatches.
+void Device::record(const Commands& commands) {
+  uint32_t stamp = 2;
+  bool wrote_by_kernel = true; // work submitted before
+  const auto write_stamp = [&](VkPipelineStageFlagBits stage) {
+    if (queries_ != VK_NULL_HANDLE) vkCmdWriteTimestamp(commands_, stage, queries_, stamp++);
+  };
+  for (const Commands::Step& step : commands.steps_) {
+    const bool dispatches = step.kind == Commands::Kind::kDispatch;
+    if (dispatches || wrote_by_kernel) {
+      const VkMemoryBarrier visible{VK_STRUCTURE_TYPE_MEMORY_BARRIER, nullptr, VK_ACCESS_MEMORY_WRITE_BIT,
+                                    VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT};
+      constexpr VkPipelineStageFlags kStages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
+      vkCmdPipelineBarrier(commands_, kStages, kStages, 0, 1, &visible, 0, nullptr, 0, nullptr);
+    }
+    wrote_by_kernel = dispatches;
+    if (step.kind == Commands::Kind::kFill) {
+      vkCmdFillBuffer(commands_, step.to, step.offset, step.bytes, step.value);
+    } else if (step.kind == Commands::Kind::kCopy) {
+      const VkBufferCopy region{step.offset, step.offset, step.bytes};
+      vkCmdCopyBuffer(commands_, step.from, step.to, 1, &region);
+    } else {
+      const Kernel& kernel = *step.kernel;
+      vkCmdBindPipeline(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline_);
+      vkCmdBindDescriptorSets(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout_, 0, 1, &kernel.set_, 0,
+                              nullptr);
+      vkCmdPushConstants(commands_, kernel.layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, step.push_bytes, step.push.data());
+      write_stamp(VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT); // once the work before has ended
+      vkCmdDispatch(commands_, step.groups_x, step.groups_y, 1);
+      write_stamp(VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT);
+    }
+  }
+}
+
+std::vector<double> Device::run(const Commands& commands) {
+  const auto dispatches = static_cast<size_t>(std::ranges::count_if(
+      commands.steps_, [](const Commands::Step& step) { return step.kind == Commands::Kind::kDispatch; }));
+  assert(dispatches <= Commands::kMostDispatches);
+  std::vector<double> times(dispatches);
+  submit([&](VkCommandBuffer) { record(commands); }, times);
+  if (queries_ == VK_NULL_HANDLE || on_cpu()) times.clear();
+  return times;
 }
 
 double Device::copy(const Buffer& from, const Buffer& to, uint64_t from_offset, uint64_t to_offset, uint64_t bytes) {

@@ -15,6 +15,7 @@
 namespace packtrace::gpu {
 
 class Buffer;
+class Commands;
 class Kernel;
 
 /// The device stopped working; nothing that was on it can be read any more. Not an Error: the program's state is lost.
@@ -60,6 +61,9 @@ public:
   /// @param push push constants
   /// Throws DeviceLost.
   double run(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups);
+  /// Runs commands and waits. Returns the time of each dispatch in ms; nothing on devices without timestamps and on CPU
+  /// devices. Throws DeviceLost.
+  std::vector<double> run(const Commands& commands);
   /// Copies bytes between buffers and waits. Returns the time in ms.
   double copy(const Buffer& from, const Buffer& to, uint64_t from_offset, uint64_t to_offset, uint64_t bytes);
   /// Sets all words of a buffer and waits.
@@ -84,7 +88,8 @@ private:
   void create_device();
   uint32_t memory_type(uint32_t allowed, bool host_visible) const;
   template <typename Record>
-  double submit(const Record& record);
+  double submit(const Record& record, std::span<double> times = {});
+  void record(const Commands& commands);
 
   const GpuConfig config_;
   VkInstance instance_ = VK_NULL_HANDLE;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/gpu/device/commands.h"
 #include "runtime/gpu/device/device.h"
 #include "runtime/gpu/device/device_features.h"
 #include "runtime/gpu/device/loader.h"
@@ -211,7 +212,7 @@ void Device::create_device() {
   VkQueryPoolCreateInfo queries{};
   queries.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
   queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
-  queries.queryCount = 2;
+  queries.queryCount = 2 + 2 * Commands::kMostDispatches;
   check(vkCreateQueryPool(device_, &queries, nullptr, &queries_), "vkCreateQueryPool");
 }
 

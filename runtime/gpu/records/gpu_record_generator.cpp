@@ -8,6 +8,10 @@
 #include <limits>
 #include <string>
 
+#include "runtime/denoise/kernels/filter_rows.h"
+#include "runtime/denoise/kernels/history_rows.h"
+#include "runtime/denoise/kernels/trend.h"
+#include "runtime/denoise/kernels/units.h"
 #include "runtime/gpu/records/record_table.h"
 #include "runtime/trace/packed/kernels/enter.h"
 #include "runtime/trace/packed/kernels/triangle_test.h"
@@ -57,6 +61,38 @@ void write_constants(std::ostream& out) {
   write(out, "kRandomOrder", kRandomOrder);
 }
 
+void write_denoiser_constants(std::ostream& out) {
+  write(out, "kHasHistory", kHasHistory);
+  write(out, "kFollowMotion", kFollowMotion);
+  write(out, "kKeepGuides", kKeepGuides);
+  write(out, "kHasPreviousZ", kHasPreviousZ);
+  write(out, "kHasLimits", kHasLimits);
+  write(out, "kTestInstances", kTestInstances);
+  write(out, "kStratified", kStratified);
+  write(out, "kLastPass", kLastPass);
+  write(out, "kStillMotion", kStillMotion);
+  write(out, "kNormalUnit", kNormalUnit);
+  write(out, "kMinHistoryWeight", kMinHistoryWeight);
+  write(out, "kMinSharpenWeight", kMinSharpenWeight);
+  write(out, "kAoUnits", float{kAoUnits});
+  write(out, "kPrecisionUnits", kPrecisionUnits);
+  write(out, "kMostPrecision", kMostPrecision);
+  write(out, "kMaxVariance", kMaxVariance);
+  write(out, "kLoneBase", kLoneBase);
+  write(out, "kLoneYoung", kLoneYoung);
+  write(out, "kMinGuide", float{kMinGuide});
+  write(out, "kLoneGuide", uint32_t{kLoneGuide});
+  write(out, "kCompany", uint32_t{kCompany});
+  write(out, "kStraight", uint32_t{kStraight});
+  write(out, "kDiagonal", uint32_t{kDiagonal});
+  write(out, "kMostDeviations", uint32_t{kMostDeviations});
+  write(out, "kTrendSteps", Trend::kSteps);
+  write(out, "kTrendFactor", Trend::kFactor);
+  out << "const float kTrendGrowth[" << trend_growth().size() << "] = float[](";
+  for (size_t e = 0; e < trend_growth().size(); ++e) out << (e > 0 ? ", " : "") << std::scientific << trend_growth()[e];
+  out << ");\n" << std::defaultfloat;
+}
+
 } // namespace
 } // namespace packtrace::gpu
 
@@ -69,6 +105,7 @@ int main(int argc, char** argv) {
   std::ofstream out(argv[1]);
   out << "// Written by gpu_record_generator from record_table.h.\n";
   write_constants(out);
+  write_denoiser_constants(out);
   for (const GlslRecord& record : kRecords) write_record(out, record);
   out.close();
   if (!out) {

@@ -84,6 +84,30 @@ inline constexpr uint32_t kNetOrder = 0;       ///< SamplerKind::kSpaceTimeNet, 
 inline constexpr uint32_t kDirectionOrder = 1; ///< 256 strata along a curve: neighbouring pixels shoot in one direction
 inline constexpr uint32_t kRandomOrder = 2;    ///< the same strata, in an order of the pixel's own
 
+// DenoiseRecord::flags
+inline constexpr uint32_t kHasHistory = 1u << 0;    ///< there is a frame before
+inline constexpr uint32_t kFollowMotion = 1u << 1;  ///< HistorySource::kMotion
+inline constexpr uint32_t kKeepGuides = 1u << 2;    ///< HistorySource::kUnchanged, with a frame before
+inline constexpr uint32_t kHasPreviousZ = 1u << 3;  ///< GBuffer::previous_z
+inline constexpr uint32_t kHasLimits = 1u << 4;     ///< AoFrame::max_history
+inline constexpr uint32_t kTestInstances = 1u << 5; ///< FluxConfig::reprojection_instance_test
+inline constexpr uint32_t kStratified = 1u << 6;    ///< AoFrame::stratified
+inline constexpr uint32_t kLastPass = 1u << 7;      ///< of the filter: writes the result
+
+/// Terms of the denoiser's passes. Names are those of LocateTerms, HistoryLengths, CorrectTerms, GuideTerms, PatchTerms
+/// and VarianceTerms.
+struct DenoiseRecord {
+  uint32_t width, height, flags;
+  float depth, slope, longest_still, longest_moving;
+  float longest, fast_frames;
+  float fast_share, gamma, change_tolerance, response;
+  float guide_depth, guide_slope;
+  uint32_t no_distance, shift, limit, stretch;
+  float noise_tolerance, prior, still_factor, still_power, moving_base, moving_gain, ratio_prior;
+  float per_sample, young, distrust, most_spread;
+};
+static_assert(sizeof(DenoiseRecord) <= 128, "push constants of more bytes need not exist");
+
 /// In the mask buffer: a cluster whose triangles need a mask lookup. Its texture coordinates follow, two floats a
 /// vertex, if has_uvs is not 0.
 struct MaskedCluster {

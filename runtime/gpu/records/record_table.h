@@ -140,6 +140,39 @@ inline constexpr std::array kOcclusionFields = {
     GlslField{"float", "parabola", offsetof(OcclusionRecord, parabola)},
 };
 
+inline constexpr std::array kDenoiseFields = {
+    GlslField{"uint", "width", offsetof(DenoiseRecord, width)},
+    GlslField{"uint", "height", offsetof(DenoiseRecord, height)},
+    GlslField{"uint", "flags", offsetof(DenoiseRecord, flags)},
+    GlslField{"float", "depth", offsetof(DenoiseRecord, depth)},
+    GlslField{"float", "slope", offsetof(DenoiseRecord, slope)},
+    GlslField{"float", "longest_still", offsetof(DenoiseRecord, longest_still)},
+    GlslField{"float", "longest_moving", offsetof(DenoiseRecord, longest_moving)},
+    GlslField{"float", "longest", offsetof(DenoiseRecord, longest)},
+    GlslField{"float", "fast_frames", offsetof(DenoiseRecord, fast_frames)},
+    GlslField{"float", "fast_share", offsetof(DenoiseRecord, fast_share)},
+    GlslField{"float", "gamma", offsetof(DenoiseRecord, gamma)},
+    GlslField{"float", "change_tolerance", offsetof(DenoiseRecord, change_tolerance)},
+    GlslField{"float", "response", offsetof(DenoiseRecord, response)},
+    GlslField{"float", "guide_depth", offsetof(DenoiseRecord, guide_depth)},
+    GlslField{"float", "guide_slope", offsetof(DenoiseRecord, guide_slope)},
+    GlslField{"uint", "no_distance", offsetof(DenoiseRecord, no_distance)},
+    GlslField{"uint", "shift", offsetof(DenoiseRecord, shift)},
+    GlslField{"uint", "limit", offsetof(DenoiseRecord, limit)},
+    GlslField{"uint", "stretch", offsetof(DenoiseRecord, stretch)},
+    GlslField{"float", "noise_tolerance", offsetof(DenoiseRecord, noise_tolerance)},
+    GlslField{"float", "prior", offsetof(DenoiseRecord, prior)},
+    GlslField{"float", "still_factor", offsetof(DenoiseRecord, still_factor)},
+    GlslField{"float", "still_power", offsetof(DenoiseRecord, still_power)},
+    GlslField{"float", "moving_base", offsetof(DenoiseRecord, moving_base)},
+    GlslField{"float", "moving_gain", offsetof(DenoiseRecord, moving_gain)},
+    GlslField{"float", "ratio_prior", offsetof(DenoiseRecord, ratio_prior)},
+    GlslField{"float", "per_sample", offsetof(DenoiseRecord, per_sample)},
+    GlslField{"float", "young", offsetof(DenoiseRecord, young)},
+    GlslField{"float", "distrust", offsetof(DenoiseRecord, distrust)},
+    GlslField{"float", "most_spread", offsetof(DenoiseRecord, most_spread)},
+};
+
 inline constexpr std::array kRecords = {
     GlslRecord{"PlacementRecord", sizeof(packed::TracePlacement), kPlacementFields},
     GlslRecord{"TopNode", sizeof(packed::TopNode), kTopNodeFields},
@@ -152,6 +185,7 @@ inline constexpr std::array kRecords = {
     GlslRecord{"CameraRecord", sizeof(CameraRecord), kCameraFields},
     GlslRecord{"PointRecord", sizeof(PointRecord), kPointFields},
     GlslRecord{"OcclusionRecord", sizeof(OcclusionRecord), kOcclusionFields},
+    GlslRecord{"DenoiseRecord", sizeof(DenoiseRecord), kDenoiseFields},
 };
 
 constexpr bool same_layouts() {

@@ -18,6 +18,9 @@ constexpr uint32_t kPrepare[] = {
 constexpr uint32_t kCamera[] = {
 #include <camera.inc>
 };
+constexpr uint32_t kCopy[] = {
+#include <copy.inc>
+};
 constexpr uint32_t kSurfacePoints[] = {
 #include <surface_points.inc>
 };
@@ -33,6 +36,36 @@ constexpr uint32_t kOcclusionQueue[] = {
 constexpr uint32_t kOcclusionQueuePartitioned[] = {
 #include <occlusion_queue_partitioned.inc>
 };
+constexpr uint32_t kDenoiseCompare[] = {
+#include <denoise_compare.inc>
+};
+constexpr uint32_t kDenoiseHistory[] = {
+#include <denoise_history.inc>
+};
+constexpr uint32_t kDenoiseCorrect[] = {
+#include <denoise_correct.inc>
+};
+constexpr uint32_t kDenoiseGuides[] = {
+#include <denoise_guides.inc>
+};
+constexpr uint32_t kDenoiseVariance[] = {
+#include <denoise_variance.inc>
+};
+constexpr uint32_t kDenoiseFinish[] = {
+#include <denoise_finish.inc>
+};
+constexpr uint32_t kDenoisePassFirst[] = {
+#include <denoise_pass_first.inc>
+};
+constexpr uint32_t kDenoisePass1[] = {
+#include <denoise_pass_1.inc>
+};
+constexpr uint32_t kDenoisePass2[] = {
+#include <denoise_pass_2.inc>
+};
+constexpr uint32_t kDenoisePass4[] = {
+#include <denoise_pass_4.inc>
+};
 
 } // namespace
 
@@ -41,10 +74,21 @@ std::span<const uint32_t> trace_any() { return kTraceAny; }
 std::span<const uint32_t> trace_closest() { return kTraceClosest; }
 std::span<const uint32_t> prepare() { return kPrepare; }
 std::span<const uint32_t> camera() { return kCamera; }
+std::span<const uint32_t> copy() { return kCopy; }
 std::span<const uint32_t> surface_points() { return kSurfacePoints; }
 std::span<const uint32_t> occlusion_rays() { return kOcclusionRays; }
 std::span<const uint32_t> occlusion_nearest() { return kOcclusionNearest; }
 std::span<const uint32_t> occlusion_queue() { return kOcclusionQueue; }
 std::span<const uint32_t> occlusion_queue_partitioned() { return kOcclusionQueuePartitioned; }
+std::span<const uint32_t> denoise_compare() { return kDenoiseCompare; }
+std::span<const uint32_t> denoise_history() { return kDenoiseHistory; }
+std::span<const uint32_t> denoise_correct() { return kDenoiseCorrect; }
+std::span<const uint32_t> denoise_guides() { return kDenoiseGuides; }
+std::span<const uint32_t> denoise_variance() { return kDenoiseVariance; }
+std::span<const uint32_t> denoise_finish() { return kDenoiseFinish; }
+std::span<const uint32_t> denoise_pass_first() { return kDenoisePassFirst; }
+std::span<const uint32_t> denoise_pass_1() { return kDenoisePass1; }
+std::span<const uint32_t> denoise_pass_2() { return kDenoisePass2; }
+std::span<const uint32_t> denoise_pass_4() { return kDenoisePass4; }
 
 } // namespace packtrace::gpu::spirv

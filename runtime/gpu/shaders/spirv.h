@@ -11,11 +11,23 @@ std::span<const uint32_t> trace_any();
 std::span<const uint32_t> trace_closest();
 std::span<const uint32_t> prepare();
 std::span<const uint32_t> camera();
+std::span<const uint32_t> copy();
 std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();
 std::span<const uint32_t> occlusion_nearest();
 std::span<const uint32_t> occlusion_queue();
 /// For devices with DeviceTraits::partitioned.
 std::span<const uint32_t> occlusion_queue_partitioned();
+
+std::span<const uint32_t> denoise_compare();
+std::span<const uint32_t> denoise_history();
+std::span<const uint32_t> denoise_correct();
+std::span<const uint32_t> denoise_guides();
+std::span<const uint32_t> denoise_variance();
+std::span<const uint32_t> denoise_finish();
+std::span<const uint32_t> denoise_pass_first();
+std::span<const uint32_t> denoise_pass_1();
+std::span<const uint32_t> denoise_pass_2();
+std::span<const uint32_t> denoise_pass_4();
 
 } // namespace packtrace::gpu::spirv

@@ -1,4 +1,4 @@
-#include "runtime/denoise/trend.h"
+#include "runtime/denoise/kernels/trend.h"
 
 #include <cmath>
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 namespace packtrace {
@@ -36,23 +37,28 @@ inline bool crosses_power_of_two(float n) {
   return n - std::bit_cast<float>(std::bit_cast<uint32_t>(n) & 0x7f800000u) < 1.0f;
 }
 
-/// The trend after a power of two is crossed.
-/// @param n length of the history, at least 1
-inline uint32_t next_trend(uint32_t bits, float mean, float n) {
-  // 2^(kStratifiedPower e), for lengths up to 2^24, beyond which floats do not count.
+/// 2^(kStratifiedPower e) for histories of 2^e frames, up to 2^24, beyond which floats do not count.
+inline const std::array<float, 25>& trend_growth() {
   static const std::array<float, 25> kGrowth = [] {
     std::array<float, 25> growth{};
     for (size_t e = 0; e < growth.size(); ++e)
       growth[e] = static_cast<float>(std::exp2(double{kStratifiedPower} * static_cast<double>(e)));
     return growth;
   }();
+  return kGrowth;
+}
+
+/// The trend after a power of two is crossed.
+/// @param n length of the history, at least 1
+inline uint32_t next_trend(uint32_t bits, float mean, float n) {
   const Trend before = unpack_trend(bits);
   Trend trend;
   trend.half = 1 + static_cast<uint32_t>(mean > 0.0f ? mean * Trend::kSteps + 0.5f : 0.5f); // NaN counts as 0
   const auto exponent = static_cast<size_t>((std::bit_cast<uint32_t>(n) >> 23) - 127);
-  if (before.half != 0 && exponent >= 2 && exponent < kGrowth.size()) { // two samples say nothing about stratification
+  if (before.half != 0 && exponent >= 2 &&
+      exponent < trend_growth().size()) { // two samples say nothing about stratification
     const float change = mean - static_cast<float>(before.half - 1) * (1.0f / Trend::kSteps);
-    const float decay = change * change * kGrowth[exponent] * (1.0f / Trend::kFactor);
+    const float decay = change * change * trend_growth()[exponent] * (1.0f / Trend::kFactor);
     trend.decay = before.decay > 0.0f ? 0.5f * (before.decay + decay) : decay;
   }
   return pack_trend(trend);

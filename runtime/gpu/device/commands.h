@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/gpu/device/vulkan_api.h"
+
+namespace packtrace::gpu {
+
+class Buffer;
+class Kernel;
+
+/// Work that is submitted at once. A dispatch sees what all work before it wrote, and a copy what dispatches before it
+/// wrote; copies that follow each other must not overlap.
+class Commands {
+public:
+  /// Kernels and buffers must outlive the run.
+  /// @param push push constants, at most kMostPushBytes
+  void dispatch(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups_x, uint32_t groups_y);
+  void copy(const Buffer& from, const Buffer& to, uint64_t bytes) { copy(from, to, 0, bytes); }
+  /// @param offset of the bytes in both buffers
+  void copy(const Buffer& from, const Buffer& to, uint64_t offset, uint64_t bytes);
+  /// Sets words of a buffer.
+  void fill(const Buffer& buffer, uint64_t first_word, uint64_t words, uint32_t value);
+
+  static constexpr size_t kMostPushBytes = 128; ///< that every device has
+  static constexpr uint32_t kMostDispatches = 32;
+
+private:
+  friend class Device;
+
+  enum class Kind : uint8_t { kDispatch, kCopy, kFill };
+  struct Step {
+    Kind kind = Kind::kDispatch;
+    const Kernel* kernel = nullptr;
+    std::array<std::byte, kMostPushBytes> push{};
+    uint32_t push_bytes = 0, groups_x = 0, groups_y = 0;
+    VkBuffer from = VK_NULL_HANDLE, to = VK_NULL_HANDLE;
+    uint64_t offset = 0, bytes = 0;
+    uint32_t value = 0;
+  };
+  std::vector<Step> steps_;
+};
+
+} // namespace packtrace::gpu

@@ -1,0 +1,256 @@
+#include "runtime/gpu/device_denoiser.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <utility>
+
+#include "pbrt_import/base/error.h"
+#include "runtime/gpu/device/buffer.h"
+#include "runtime/gpu/device/commands.h"
+#include "runtime/gpu/device/kernel.h"
+#include "runtime/gpu/shaders/spirv.h"
+
+namespace packtrace::gpu {
+namespace {
+
+/// A buffer on the device, and its mapped twin.
+struct Staged {
+  Buffer host, device;
+
+  void resize(const std::shared_ptr<Device>& owner, uint64_t bytes, const char* what) {
+    host = Buffer(), device = Buffer();
+    host = Buffer(owner, bytes, BufferPlace::kHost, what);
+    device = Buffer(owner, bytes, BufferPlace::kDevice, what);
+  }
+  template <typename T>
+  void upload(Commands& commands, std::span<const T> values) const {
+    if (values.empty()) return;
+    std::memcpy(host.data(), values.data(), values.size_bytes());
+    commands.copy(host, device, values.size_bytes());
+  }
+};
+
+/// What a frame leaves to the next one.
+struct Past {
+  Buffer guides, history, trend;
+};
+// Per pixel.
+constexpr uint32_t kGuideBytes = 16, kHistoryBytes = 16, kTrendBytes = 4, kSampleBytes = 8, kPairBytes = 12,
+                   kNoisyBytes = 4, kResultBytes = 4;
+
+/// Bytes per pixel that the history's kernel reads and writes.
+uint32_t history_bytes(uint32_t flags) {
+  uint32_t bytes = 4 + 2 * (kHistoryBytes + kTrendBytes) + kSampleBytes; // with the samples
+  if ((flags & kHasLimits) != 0) bytes += 4;
+  if ((flags & kKeepGuides) != 0) return bytes + kGuideBytes;
+  bytes += 20 + kGuideBytes; // depth, normal and instance become a guide
+  if ((flags & kFollowMotion) == 0) return bytes;
+  return bytes + kGuideBytes + 8 + ((flags & kHasPreviousZ) != 0 ? 4 : 0); // the guide before, and motion
+}
+
+/// Pixels of a group. Kernels that read many neighbours have larger ones.
+constexpr uint32_t kGroupWidth = 32, kGroupHeight = 8, kTileHeight = 16;
+constexpr std::array<uint32_t, 4> kSteps = {1, 2, 4, 1}; // of the filter's passes
+
+uint32_t groups(uint32_t pixels, uint32_t of_group) { return (pixels + of_group - 1) / of_group; }
+
+std::span<const uint32_t> pass_code(uint32_t pass) {
+  if (pass == 0) return spirv::denoise_pass_first();
+  return kSteps[pass] == 1   ? spirv::denoise_pass_1()
+         : kSteps[pass] == 2 ? spirv::denoise_pass_2()
+                             : spirv::denoise_pass_4();
+}
+
+constexpr const char* kPassNames[] = {"pass 1", "pass 2", "pass 3", "pass 4"};
+
+} // namespace
+
+struct DeviceDenoiser::State {
+  std::shared_ptr<Device> device;
+  uint32_t width = 0, height = 0;
+  Staged view_z, normal, instance, motion, previous_z, limits, ao, result;
+  std::array<Past, 2> past;
+  uint32_t now = 0; ///< of `past`
+  Buffer samples, pair_guides, changes;
+  std::array<Buffer, 2> noisy; ///< read and written by the filter's passes in turn
+  std::unique_ptr<Kernel> compare, history, correct, guides, variance, finish;
+  std::vector<std::unique_ptr<Kernel>> filter_passes;
+  Commands commands;
+  std::vector<DenoiserDispatch> dispatches; ///< in `commands`
+
+  uint64_t pixels() const { return uint64_t{width} * height; }
+  void dispatch(const char* name, Kernel& kernel, const DenoiseRecord& terms, uint32_t tile_height, uint32_t bytes);
+  std::vector<DenoiserDispatch> run();
+  void upload(const DenoiseRecord& terms, const DenoiserFrame& frame);
+  void find_changes(const DenoiseRecord& terms);
+  void bind(Kernel& kernel, std::initializer_list<const Buffer*> buffers) {
+    uint32_t binding = 0;
+    for (const Buffer* buffer : buffers) kernel.bind(binding++, *buffer);
+  }
+};
+
+DeviceDenoiser::DeviceDenoiser(const GpuConfig& device, const Passes& passes) : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.device = Device::share(device);
+  const auto kernel = [&](std::span<const uint32_t> spirv, std::span<const uint32_t> constants, uint32_t bindings) {
+    return std::make_unique<Kernel>(s.device, spirv, constants, bindings, sizeof(DenoiseRecord));
+  };
+  const uint32_t squarings[] = {passes.normal_squarings}, radius[] = {passes.window_radius};
+  s.compare = kernel(spirv::denoise_compare(), {}, 6);
+  s.history = kernel(spirv::denoise_history(), squarings, 15);
+  s.correct = kernel(spirv::denoise_correct(), radius, 3);
+  s.guides = kernel(spirv::denoise_guides(), {}, 3);
+  s.variance = kernel(spirv::denoise_variance(), {}, 7);
+  if (passes.filter_passes == 0) s.finish = kernel(spirv::denoise_finish(), {}, 3);
+  for (uint32_t i = 0; i < passes.filter_passes; ++i) s.filter_passes.push_back(kernel(pass_code(i), {}, 5));
+}
+
+DeviceDenoiser::~DeviceDenoiser() = default;
+
+void DeviceDenoiser::resize(uint32_t width, uint32_t height) {
+  State& s = *state_;
+  s.width = width, s.height = height, s.now = 0;
+  const uint64_t n = s.pixels();
+  s.view_z.resize(s.device, 4 * n, "depths"), s.normal.resize(s.device, 12 * n, "normals");
+  s.instance.resize(s.device, 4 * n, "instances"), s.motion.resize(s.device, 8 * n, "motion");
+  s.previous_z.resize(s.device, 4 * n, "previous depths"), s.limits.resize(s.device, 4 * n, "limits of histories");
+  s.ao.resize(s.device, 4 * n, "samples"), s.result.resize(s.device, 3 * kResultBytes * n, "the denoiser's result");
+  const auto on_device = [&](Buffer& buffer, uint64_t bytes, const char* what) {
+    buffer = Buffer();
+    buffer = Buffer(s.device, bytes, BufferPlace::kDevice, what);
+  };
+  for (Past& past : s.past) {
+    on_device(past.guides, kGuideBytes * n, "guides"), on_device(past.history, kHistoryBytes * n, "the history");
+    on_device(past.trend, kTrendBytes * n, "trends");
+  }
+  on_device(s.samples, kSampleBytes * n, "changes of samples"),
+      on_device(s.pair_guides, kPairBytes * n, "guide weights");
+  on_device(s.changes, 8, "flags");
+  for (Buffer& buffer : s.noisy) on_device(buffer, kNoisyBytes * n, "the filter's values");
+}
+
+/// @param bytes DenoiserDispatch::bytes_per_pixel
+void DeviceDenoiser::State::dispatch(const char* name, Kernel& kernel, const DenoiseRecord& terms, uint32_t tile_height,
+                                     uint32_t bytes) {
+  dispatches.push_back({name, 0.0, bytes});
+  commands.dispatch(kernel, std::as_bytes(std::span(&terms, 1)), groups(width, kGroupWidth),
+                    groups(height, tile_height));
+}
+
+/// Runs the commands and forgets them.
+std::vector<DenoiserDispatch> DeviceDenoiser::State::run() {
+  std::vector<DenoiserDispatch> done = std::exchange(dispatches, {});
+  const std::vector<double> ms = device->run(std::exchange(commands, {}));
+  done.resize(ms.size());
+  for (size_t i = 0; i < ms.size(); ++i) done[i].ms = ms[i];
+  return done;
+}
+
+/// Uploads what the history's kernel reads.
+void DeviceDenoiser::State::upload(const DenoiseRecord& terms, const DenoiserFrame& frame) {
+  if ((terms.flags & kKeepGuides) == 0)
+    view_z.upload(commands, frame.view_z), normal.upload(commands, frame.normal),
+        instance.upload(commands, frame.instance);
+  if ((terms.flags & kFollowMotion) != 0)
+    motion.upload(commands, frame.motion_px), previous_z.upload(commands, frame.previous_z);
+  limits.upload(commands, frame.max_history);
+  ao.upload(commands, frame.ao);
+}
+
+/// Writes two words: whether something moved in this frame, and whether a guide changed since the pair guides were
+/// made.
+void DeviceDenoiser::State::find_changes(const DenoiseRecord& terms) {
+  const bool first = (terms.flags & kHasHistory) == 0, follows = (terms.flags & kFollowMotion) != 0;
+  commands.fill(changes, 0, 1, first ? 1 : 0);
+  if (first || (!follows && (terms.flags & kKeepGuides) == 0)) commands.fill(changes, 1, 1, 1);
+  if (first || !follows) return;
+  bind(*compare, {&view_z.device, &normal.device, &instance.device, &motion.device, &past[now ^ 1].guides, &changes});
+  dispatch("compare", *compare, terms, kGroupHeight, 0);
+}
+
+std::vector<DenoiserDispatch> DeviceDenoiser::add(const DenoiseRecord& terms, const DenoiserFrame& frame) {
+  State& s = *state_;
+  const bool follows = (terms.flags & kFollowMotion) != 0;
+  if (follows) s.now ^= 1;
+  const Past &before = s.past[follows ? s.now ^ 1 : s.now], &now = s.past[s.now];
+  s.upload(terms, frame);
+  s.find_changes(terms);
+  s.bind(*s.history, {&s.view_z.device, &s.normal.device, &s.instance.device, &s.motion.device, &s.previous_z.device,
+                      &s.limits.device, &s.ao.device, &s.changes, &before.guides, &now.guides, &before.history,
+                      &now.history, &before.trend, &now.trend, &s.samples});
+  s.dispatch("history", *s.history, terms, kGroupHeight, history_bytes(terms.flags));
+  if ((terms.flags & (kFollowMotion | kKeepGuides)) != 0) { // histories of jittered pixels are plain means
+    s.bind(*s.correct, {&s.samples, &now.history, &now.trend});
+    s.dispatch("correct", *s.correct, terms, kTileHeight, kSampleBytes);
+  }
+  return s.run();
+}
+
+std::vector<DenoiserDispatch> DeviceDenoiser::filter(const DenoiseRecord& terms, const DenoiserResult& result) {
+  State& s = *state_;
+  const Past& now = s.past[s.now];
+  s.bind(*s.guides, {&now.guides, &s.changes, &s.pair_guides});
+  s.dispatch("guides", *s.guides, terms, kTileHeight, kGuideBytes + kPairBytes);
+  s.commands.fill(s.changes, 1, 1, 0);
+  s.bind(*s.variance,
+         {&now.history, &now.trend, &now.guides, &s.pair_guides, &s.changes, &s.noisy[0], &s.result.device});
+  s.dispatch("variance", *s.variance, terms, kGroupHeight,
+             kHistoryBytes + kTrendBytes + kGuideBytes + kNoisyBytes + kResultBytes);
+  if (s.finish) {
+    s.bind(*s.finish, {&s.noisy[0], &now.history, &s.result.device});
+    s.dispatch("finish", *s.finish, terms, kGroupHeight, kNoisyBytes + kHistoryBytes / 2 + 2 * kResultBytes);
+  }
+  for (size_t i = 0; i < s.filter_passes.size(); ++i) {
+    Kernel& pass = *s.filter_passes[i];
+    s.bind(pass, {&s.noisy[i % 2], &s.noisy[(i + 1) % 2], &s.pair_guides, &now.history, &s.result.device});
+    DenoiseRecord of_pass = terms;
+    const bool last = i + 1 == s.filter_passes.size();
+    if (last) of_pass.flags |= kLastPass;
+    s.dispatch(kPassNames[i], pass, of_pass, kTileHeight,
+               kNoisyBytes + kPairBytes / 3 + (i == 0 || last ? kHistoryBytes / 2 : 0) +
+                   (last ? 2 * kResultBytes : kNoisyBytes));
+  }
+  const std::span<float> planes[] = {result.ao, result.variance, result.tspp};
+  for (size_t i = 0; i < std::size(planes); ++i)
+    if (!planes[i].empty())
+      s.commands.copy(s.result.device, s.result.host, i * planes[i].size_bytes(), planes[i].size_bytes());
+  std::vector<DenoiserDispatch> times = s.run();
+  for (size_t i = 0; i < std::size(planes); ++i)
+    std::copy_n(s.result.host.as<float>() + i * planes[i].size(), planes[i].size(), planes[i].begin());
+  return times;
+}
+
+std::vector<std::byte> DeviceDenoiser::save() const {
+  const State& s = *state_;
+  const Past& now = s.past[s.now];
+  const uint64_t n = s.pixels();
+  std::vector<std::byte> bytes((kGuideBytes + kHistoryBytes + kTrendBytes) * n);
+  std::span<std::byte> rest = bytes;
+  for (const auto& [buffer, size] :
+       {std::pair{&now.guides, kGuideBytes}, {&now.history, kHistoryBytes}, {&now.trend, kTrendBytes}}) {
+    download(s.device, *buffer, 0, rest.first(size * n));
+    rest = rest.subspan(size * n);
+  }
+  return bytes;
+}
+
+void DeviceDenoiser::restore(std::span<const std::byte> bytes) {
+  State& s = *state_;
+  const Past& now = s.past[s.now];
+  const uint64_t n = s.pixels();
+  if (bytes.size() != (kGuideBytes + kHistoryBytes + kTrendBytes) * n)
+    throw Error(ErrorKind::kInput, "denoiser: the saved history has another size");
+  for (const auto& [buffer, size] :
+       {std::pair{&now.guides, kGuideBytes}, {&now.history, kHistoryBytes}, {&now.trend, kTrendBytes}}) {
+    update(s.device, *buffer, 0, bytes.first(size * n));
+    bytes = bytes.subspan(size * n);
+  }
+  s.device->fill(s.changes, 1);
+}
+
+uint64_t DeviceDenoiser::state_bytes() const {
+  return (2 * (kGuideBytes + kHistoryBytes + kTrendBytes) + kPairBytes) * state_->pixels();
+}
+
+} // namespace packtrace::gpu

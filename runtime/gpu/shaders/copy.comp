@@ -1,0 +1,11 @@
+#version 460
+// Copies words: what reading and writing bytes costs at least.
+layout(local_size_x = 256) in;
+layout(std430, binding = 0) readonly restrict buffer From { uvec4 from[]; };
+layout(std430, binding = 1) writeonly restrict buffer To { uvec4 to[]; };
+layout(push_constant) uniform Push { uint count; }; // vectors of four words
+
+void main() {
+  uint stride = gl_NumWorkGroups.x * 256u;
+  for (uint i = gl_GlobalInvocationID.x; i < count; i += stride) to[i] = from[i];
+}

@@ -1,0 +1,98 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Corrects the history where the fast one shows a change: sum_windows(), finish_windows() and correct_row() of
+// runtime/denoise/kernels/history_rows_body.h.
+#include "denoise.glsl"
+
+layout(constant_id = 0) const uint kRadius = 4u; // of the window, at most 4
+
+layout(local_size_x = 32, local_size_y = 8) in;
+layout(std430, binding = 0) readonly restrict buffer Samples { vec2 samples[]; };
+layout(std430, binding = 1) restrict buffer History { vec2 history[]; };
+layout(std430, binding = 2) writeonly restrict buffer Trend { uint trend[]; };
+
+const int kWide = 32, kHigh = 16, kBorder = 4; // pixels of a group; border
+shared vec2 s_sample[(kHigh + 2 * kBorder) * (kWide + 2 * kBorder)];
+shared uint s_count[(kHigh + 2 * kBorder) * kWide]; // | of the narrow window << 16
+shared vec4 s_sums[(kHigh + 2 * kBorder) * kWide];  // value, square, change, change of the narrow window
+
+void load_samples(ivec2 origin) {
+  const int stride = kWide + 2 * kBorder;
+  for (uint i = gl_LocalInvocationIndex; i < s_sample.length(); i += 256u) {
+    ivec2 p = origin + ivec2(int(i) % stride, int(i) / stride) - kBorder;
+    s_sample[i] = inside(p) ? samples[index_of(p)] : vec2(-1.0, 0.0);
+  }
+}
+
+void sum_rows() {
+  for (uint i = gl_LocalInvocationIndex; i < s_count.length(); i += 256u) {
+    uint at = i / kWide * (kWide + 2 * kBorder) + i % kWide + kBorder;
+    vec2 c = s_sample[at], l = s_sample[at - 1u], r = s_sample[at + 1u];
+    uint narrow = uint(l.x >= 0.0) + uint(c.x >= 0.0) + uint(r.x >= 0.0), count = narrow;
+    precise float narrow_change = l.y + c.y + r.y;
+    precise float change = narrow_change, value = greater(c.x, 0.0);
+    precise float squares = value * value;
+    for (uint d = 1u; d <= kRadius; ++d) {
+      l = s_sample[at - d], r = s_sample[at + d];
+      if (d > 1u) count += uint(l.x >= 0.0) + uint(r.x >= 0.0), change += l.y + r.y;
+      float lv = greater(l.x, 0.0), rv = greater(r.x, 0.0);
+      value += lv + rv;
+      squares += lv * lv + rv * rv;
+    }
+    s_count[i] = count | (narrow << 16);
+    s_sums[i] = vec4(value, squares, change, narrow_change);
+  }
+}
+
+// Reduces the magnitude of a change by a limit, at most to 0.
+float excess(float change, float limit) {
+  float left = greater(abs(change) - limit, 0.0);
+  return change < 0.0 ? -left : left;
+}
+
+void correct(ivec2 p, uint at) {
+  float count = 0.0, narrow_count = 0.0;
+  precise float value = 0.0, squares = 0.0, change = 0.0, narrow_change = 0.0;
+  for (uint r = 0u; r <= 2u * kRadius; ++r) {
+    uint row = at + (r + kBorder - kRadius) * kWide;
+    uint counts = s_count[row];
+    vec4 sums = s_sums[row];
+    count += float(counts & 0xffffu);
+    value += sums.x, squares += sums.y, change += sums.z;
+    if (r + 1u >= kRadius && r <= kRadius + 1u) narrow_count += float(counts >> 16), narrow_change += sums.w;
+  }
+  float n = greater(count, 1.0);
+  precise float spread = squares - value * (value / n);
+  float variance = count > 1.0 ? greater(spread, 0.0) / greater(n - 1.0, 1.0) : 0.0;
+  float noise = variance * terms.fast_share, narrow_n = greater(narrow_count, 1.0);
+  precise float wide = excess(change / n, terms.gamma * sqrt(noise / n) + terms.change_tolerance);
+  precise float narrow = excess(narrow_change / narrow_n, terms.gamma * sqrt(noise / narrow_n) + terms.change_tolerance);
+  float wanted = abs(narrow) > abs(wide) ? narrow : wide;
+  if (wanted == 0.0) return;
+
+  uint i = index_of(p);
+  vec2 slow = history[i], rest = history[pixel_count() + i];
+  float old_mean = slow.x;
+  float new_mean = slow.y > 0.0 ? lesser(greater(old_mean + wanted, 0.0), 1.0) : old_mean;
+  float shift = new_mean - old_mean;
+  if (shift == 0.0) return;
+  float kept = 1.0 - lesser(terms.response * abs(shift), 1.0);
+  float frames = lesser(slow.y, greater(slow.y * kept, terms.fast_frames));
+  precise float moment = greater(rest.x - old_mean * old_mean, 0.0); // a shift keeps the variance
+  precise float square = moment + new_mean * new_mean;
+  history[i] = vec2(new_mean, frames);
+  history[pixel_count() + i] = vec2(square, rest.y);
+  trend[i] = 0u;
+}
+
+void main() {
+  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh);
+  load_samples(origin);
+  barrier();
+  sum_rows();
+  barrier();
+  for (uint y = gl_LocalInvocationID.y; y < kHigh; y += 8u) {
+    ivec2 p = origin + ivec2(gl_LocalInvocationID.x, y);
+    if (inside(p)) correct(p, y * kWide + gl_LocalInvocationID.x);
+  }
+}

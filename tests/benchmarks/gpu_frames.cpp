@@ -1,0 +1,145 @@
+#include "tests/benchmarks/gpu_frames.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "runtime/frame/frame_loop.h"
+#include "runtime/gpu/device/buffer.h"
+#include "runtime/gpu/device/kernel.h"
+#include "runtime/gpu/shaders/spirv.h"
+#include "runtime/stopwatch.h"
+
+namespace packtrace {
+namespace {
+
+using Json = nlohmann::json;
+
+/// A kernel that copies.
+class CopyFloor {
+public:
+  explicit CopyFloor(const GpuConfig& config)
+      : device_(gpu::Device::share(config)), kernel_(device_, gpu::spirv::copy(), {}, 2, sizeof(uint32_t)) {}
+
+  /// Median time of reading half of the bytes and writing the other half.
+  double ms(uint64_t bytes) {
+    const gpu::Buffer from(device_, bytes / 2, gpu::BufferPlace::kDevice, "bytes to copy"),
+        to(device_, bytes / 2, gpu::BufferPlace::kDevice, "copied bytes");
+    device_->fill(from, 1);
+    kernel_.bind(0, from), kernel_.bind(1, to);
+    const auto vectors = static_cast<uint32_t>(bytes / 32);
+    std::vector<double> times;
+    for (int i = 0; i < 9; ++i)
+      times.push_back(
+          device_->run(kernel_, std::as_bytes(std::span(&vectors, 1)), std::clamp(vectors / 256, 1u, 16384u)));
+    return median(times);
+  }
+
+private:
+  std::shared_ptr<gpu::Device> device_;
+  gpu::Kernel kernel_;
+};
+
+/// Times of some frames.
+struct Times {
+  std::map<std::string, std::vector<double>> passes;
+  std::map<std::string, uint32_t> bytes;
+  std::vector<std::string> order;
+  std::vector<double> frame, primary, ao, denoise, resolve, passes_together;
+
+  void add(const FrameLoop& loop, const FrameReport& report, const PictureReport& picture, double frame_s) {
+    double sum = 0.0;
+    for (const DenoiserPassTime& pass : loop.denoiser().pass_times()) {
+      if (!passes.contains(pass.name)) order.emplace_back(pass.name);
+      passes[pass.name].push_back(pass.ms);
+      bytes[pass.name] = pass.bytes_per_pixel;
+      sum += pass.ms;
+    }
+    passes_together.push_back(sum);
+    frame.push_back(frame_s * 1e3);
+    primary.push_back(report.times.primary_s * 1e3), ao.push_back(report.times.ao_s * 1e3);
+    denoise.push_back((report.times.denoise_s + picture.times.denoise_s) * 1e3);
+    resolve.push_back((report.times.resolve_s + picture.times.resolve_s) * 1e3);
+  }
+
+  Json json(CopyFloor& floor, uint64_t pixels) const {
+    Json out{{"frame_ms", median(frame)},     {"primary_ms", median(primary)}, {"ao_ms", median(ao)},
+             {"denoise_ms", median(denoise)}, {"resolve_ms", median(resolve)}, {"passes_ms", median(passes_together)}};
+    uint64_t together = 0;
+    for (const std::string& name : order) {
+      const uint64_t of_pass = bytes.at(name);
+      together += of_pass;
+      Json row{{"pass", name}, {"ms", median(passes.at(name))}, {"bytes_per_pixel", of_pass}};
+      if (of_pass > 0) row["copy_ms"] = floor.ms(of_pass * pixels);
+      out["passes"].push_back(row);
+    }
+    out["bytes_per_pixel"] = together;
+    if (together > 0) out["copy_ms"] = floor.ms(together * pixels);
+    return out;
+  }
+};
+
+Camera moved(Camera camera, double step) {
+  camera.world_from_camera[3] += camera.world_from_camera[0] * step;
+  return camera;
+}
+
+} // namespace
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+Json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const Camera& camera, ImageSize size,
+                        const GpuConfig& device, uint32_t repeats) {
+  FrameScene scene{&source, &file, {}};
+  scene.backend.backend = Backend::kGpu, scene.backend.gpu = device;
+  FrameConfig config;
+  config.size = size;
+  config.jitter = false;
+  config.plain_layers = 0;
+  FrameLoop loop(scene, config);
+  scene.backend.backend = Backend::kPacked;
+  FrameLoop packed(scene, config);
+  const Bounds world = source.world_bounds();
+  const double step = 2e-4 * glm::length(world.hi - world.lo);
+  constexpr uint32_t kWarm = 3, kCompared = 4;
+  Times moving, still;
+  Progress progress;
+  RenderedImage image, expected;
+  double most = 0.0, squares = 0.0;
+  for (uint32_t f = 0; f < kWarm + repeats; ++f) {
+    const Camera view = moved(camera, step * f);
+    PictureReport picture, of_packed;
+    const Stopwatch watch;
+    const FrameReport report = loop.next_frame(view, 0.0, progress);
+    loop.resolve(image, picture);
+    if (f >= kWarm) moving.add(loop, report, picture, watch.seconds());
+    if (f >= kCompared) continue;
+    packed.next_frame(view, 0.0, progress);
+    packed.resolve(expected, of_packed);
+    squares = 0.0;
+    for (size_t i = 0; i < image.ao.size(); ++i) {
+      const double difference = double{image.ao[i]} - double{expected.ao[i]};
+      most = std::max(most, std::abs(difference)), squares += difference * difference;
+    }
+  }
+  for (uint32_t f = 0; f < kWarm + repeats; ++f) {
+    PictureReport picture;
+    const Stopwatch watch;
+    const FrameReport report = loop.next_frame(moved(camera, step * (kWarm + repeats - 1)), 0.0, progress);
+    loop.resolve(image, picture);
+    if (f >= kWarm) still.add(loop, report, picture, watch.seconds());
+  }
+  CopyFloor floor(device);
+  return {{"moving", moving.json(floor, size.pixels())},
+          {"still", still.json(floor, size.pixels())},
+          {"largest_difference", most},
+          {"rms_difference", std::sqrt(squares / static_cast<double>(size.pixels()))}};
+}
+
+} // namespace packtrace

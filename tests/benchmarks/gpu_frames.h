@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "compress/format/file/baked_file.h"
+#include "pbrt_import/scene/camera_rays.h"
+#include "runtime/gpu/gpu_config.h"
+#include "runtime/trace/source/packed_source.h"
+
+namespace packtrace {
+
+/// 0 without values.
+double median(std::vector<double> values);
+
+/// Measures frames of a moving and of a still camera with backend gpu: the denoiser's dispatches against a copy kernel
+/// that reads and writes as many bytes, whole frames on the wall clock, and the difference from backend packed.
+nlohmann::json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const Camera& camera,
+                                  ImageSize size, const GpuConfig& device, uint32_t repeats);
+
+} // namespace packtrace
