@@ -123,13 +123,13 @@ std::string name_of(GltfCodec codec) {
 
 Exported export_file(const ExportOptions& options, const std::string& layout, const MemoryBudget& budget,
                      Progress& progress) {
-  if (!is_baked_file(options.input))
-    throw FileError(ErrorKind::kInput, options.input,
-                    "not a packtrace baked file; create one with packtrace bake SCENE.pbrt -o FILE.ptk");
   if (layout == kShader) {
     ShaderExport result = export_shader(options.input, options.output, options.shader, budget, progress);
     return {std::move(result.bytes), {}, std::move(result.json), std::move(result.text)};
   }
+  if (!is_baked_file(options.input))
+    throw FileError(ErrorKind::kInput, options.input,
+                    "not a packtrace baked file; create one with packtrace bake SCENE.pbrt -o FILE.ptk");
   const MemoryReservation memory = reserve_decoded(options.input, budget);
   const BakedFile file = BakedFile::open(options.input);
   ExportNames names{options.input, options.output, {}, {}, {}};
@@ -172,8 +172,7 @@ void write_others(const ExportOptions& options, const std::vector<ExportedFile>&
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
-  if (layout != kShader && options.shader.any())
-    throw Error(ErrorKind::kUsage, "the options of shaders only apply to .glsl files (--layout glsl)");
+  if (layout != kShader) refuse_without_effect(options.shader.names(), "--layout " + layout + ", only on .glsl files");
   if (layout != kGltf && options.has_gltf_option)
     throw Error(
         ErrorKind::kUsage,
@@ -240,14 +239,14 @@ void add_gltf_options(CLI::App& verb, ExportOptions& options) {
 
 void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
-  CLI::App& verb =
-      add_verb(app, globals, "export", "Convert a .ptk file to glTF, pbrt-v3, OBJ, arrays or a GPU vertex layout",
-               [options, &globals] { return run(*options, globals); });
-  verb.add_option("FILE", options->input, ".ptk file to convert")->required();
-  add_output_option(
-      verb, options->output,
-      "Output file (required): .glb, .gltf, .v16, .pbrt, .obj, or .json with --streams; or - for standard output "
-      "together with --layout. Files that belong to it are beside it, in NAME_files, or NAME.bin");
+  CLI::App& verb = add_verb(app, globals, "export",
+                            "Convert a .ptk file to glTF, pbrt-v3, OBJ, arrays, a GPU vertex layout or a shader",
+                            [options, &globals] { return run(*options, globals); });
+  verb.add_option("FILE", options->input, ".ptk file to convert; or an image, for .glsl")->required();
+  add_output_option(verb, options->output,
+                    "Output file (required): .glb, .gltf, .v16, .glsl, .pbrt, .obj, or .json with --streams; or - for "
+                    "standard output "
+                    "together with --layout. Files that belong to it are beside it, in NAME_files, or NAME.bin");
   verb.add_option(
           "--layout", options->layout,
           "Output format. gltf is a glTF 2.0 file with materials, instances, textures and cameras; "
@@ -270,6 +269,8 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
               "  packtrace export house.ptk -o house.gltf --profile portable\n"
               "  packtrace export house.ptk -o unpacked/house.pbrt\n"
               "  packtrace export house.ptk -o house.json --streams raw\n"
+              "  packtrace export bunny.ptk -o bunny.glsl --proxy-voxels 40\n"
+              "  packtrace export picture.png -o picture.glsl --image-format bit --image-size 300\n"
               "  packtrace export house.ptk -o - --layout gltf | gltf_viewer /dev/stdin");
 }
 

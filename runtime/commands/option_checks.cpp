@@ -98,6 +98,13 @@ void refuse_foreign_ending(const std::filesystem::path& file, std::initializer_l
                                              advice.empty() ? "" : "; " + advice));
 }
 
+void refuse_without_effect(const std::vector<std::string>& names, const std::string& what) {
+  if (names.empty()) return;
+  std::string list = names.front();
+  for (size_t i = 1; i < names.size(); ++i) list += (i + 1 < names.size() ? ", " : " and ") + names[i];
+  throw Error(ErrorKind::kUsage, list + (names.size() > 1 ? " have" : " has") + " no effect on " + what);
+}
+
 std::string shell_word(const std::string& word) {
   const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
                                                              "0123456789_-+=:,./@%") == std::string::npos;

@@ -48,6 +48,9 @@ std::string ending_of(const std::filesystem::path& file);
 void refuse_foreign_ending(const std::filesystem::path& file, std::initializer_list<std::string_view> own,
                            std::string_view writer, const std::string& advice);
 
+/// Throws Error(kUsage) if there are names of given options: "A and B have no effect on WHAT".
+void refuse_without_effect(const std::vector<std::string>& names, const std::string& what);
+
 /// Quotes a word for a shell if necessary.
 std::string shell_word(const std::string& word);
 

@@ -45,11 +45,23 @@ void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
       ->group(kGroup);
 }
 
+std::vector<std::string> ProxyOptions::names() const {
+  std::vector<std::string> names;
+  if (proxy != kNoProxy) names.push_back("--proxy");
+  if (voxels) names.push_back("--proxy-voxels");
+  if (rule) names.push_back("--proxy-surface");
+  if (field_bits) names.push_back("--proxy-bits");
+  if (fill) names.push_back("--proxy-fill");
+  if (dag) names.push_back("--proxy-dag");
+  if (materials) names.push_back("--proxy-materials");
+  return names;
+}
+
 ProxyConfig make_proxy_config(const ProxyOptions& options) {
   ProxyConfig config;
   if (options.proxy == kNoProxy) {
-    if (options.voxels || options.rule || options.field_bits || options.fill || options.dag || options.materials)
-      throw Error(ErrorKind::kUsage, "the --proxy- options require --proxy voxels or sdf");
+    if (const std::vector<std::string> names = options.names(); !names.empty())
+      throw Error(ErrorKind::kUsage, names.front() + " requires --proxy voxels or sdf");
     return config;
   }
   config.use = options.proxy == kFieldName ? ProxyUse::kField : ProxyUse::kVoxels;

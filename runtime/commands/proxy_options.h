@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -16,6 +17,9 @@ struct ProxyOptions {
   std::optional<std::string> rule;
   std::optional<uint32_t> field_bits;
   bool fill = false, dag = false, materials = false;
+
+  /// Names of the given options.
+  std::vector<std::string> names() const;
 };
 
 void add_proxy_options(CLI::App& verb, ProxyOptions& options);

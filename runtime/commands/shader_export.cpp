@@ -10,6 +10,7 @@
 #include "compress/format/voxels/proxy_section.h"
 #include "pbrt_import/base/file_error.h"
 #include "runtime/commands/file_report.h"
+#include "runtime/commands/image_export.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
 
@@ -54,8 +55,7 @@ public:
     config_ = make_proxy_config(proxy);
     build_ = options.proxy.voxels || options.proxy.rule || options.proxy.fill || options.proxy.dag ||
              options.proxy.materials;
-    limit_ = options.max_elements.value_or(kMaxShaderElements);
-    if (limit_ == 0) throw Error(ErrorKind::kUsage, "--max-elements must be at least 1");
+    limit_ = options.config().max_elements;
   }
 
   Proxy run() const {
@@ -130,18 +130,50 @@ void add_shader_options(CLI::App& verb, ShaderOptions& options) {
   verb.add_option("--up", options.up, "Axis of the geometry that points up in the picture (default y)")
       ->check(one_of({"x", "y", "z"}))
       ->group(kGroup);
+  add_image_options(verb, options, kGroup);
   add_proxy_options(verb, options.proxy);
+}
+
+std::vector<std::string> ShaderOptions::voxel_names() const {
+  std::vector<std::string> names = proxy.names();
+  if (geometry) names.push_back("--geometry");
+  if (up) names.push_back("--up");
+  return names;
+}
+
+std::vector<std::string> ShaderOptions::image_names() const {
+  std::vector<std::string> names;
+  if (texture) names.push_back("--texture");
+  if (image_format) names.push_back("--image-format");
+  if (image_size) names.push_back("--image-size");
+  return names;
+}
+
+std::vector<std::string> ShaderOptions::names() const {
+  std::vector<std::string> names = voxel_names();
+  for (std::string& name : image_names()) names.push_back(std::move(name));
+  if (form) names.push_back("--shader");
+  if (max_elements) names.push_back("--max-elements");
+  return names;
+}
+
+ShaderConfig ShaderOptions::config() const {
+  ShaderConfig result;
+  result.form = form == kGlsl450Name ? ShaderForm::kGlsl450 : ShaderForm::kShadertoy;
+  result.max_elements = max_elements.value_or(kMaxShaderElements);
+  if (result.max_elements == 0) throw Error(ErrorKind::kUsage, "--max-elements must be at least 1");
+  return result;
 }
 
 ShaderExport export_shader(const std::string& input, const std::string& output, const ShaderOptions& options,
                            const MemoryBudget& budget, Progress& progress) {
+  if (options.texture || !is_baked_file(input)) return export_image(input, output, options, budget, progress);
+  refuse_without_effect(options.image_names(), "voxels; add --texture for a texture of the file");
   const MemoryReservation memory = reserve_decoded(input, budget);
   const BakedFile file = BakedFile::open(input);
   const ShaderMaker maker(file, input, options, budget, progress);
   const Proxy proxy = maker.run();
-  ShaderConfig config;
-  config.form = options.form == kGlsl450Name ? ShaderForm::kGlsl450 : ShaderForm::kShadertoy;
-  config.max_elements = options.max_elements.value_or(kMaxShaderElements);
+  const ShaderConfig config = options.config();
   const VoxelIndex& size = proxy.voxels.size();
   const std::string text = voxel_shader(proxy, shader_view(size, options.up.value_or("y")[0] - 'x'), config);
   const auto* const first = reinterpret_cast<const std::byte*>(text.data());
@@ -159,7 +191,8 @@ ShaderExport export_shader(const std::string& input, const std::string& output, 
            {"bits", proxy.voxels.bits()},
            {"surface_error", proxy.record.surface_error},
            {"voxel_error", proxy.record.voxel_error},
-           {"bytes", text.size()}},
+           {"bytes", text.size()},
+           {"peak_rss_bytes", peak_rss_bytes()}},
           fmt::format(grouped(), "{}: {} x {} x {} voxels in {:L} of {:L} array elements, {:L} bytes of text\n", output,
                       size[0], size[1], size[2], elements, config.max_elements, text.size())};
 }

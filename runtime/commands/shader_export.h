@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "compress/exchange/shader/shader_text.h"
 #include "pbrt_import/base/progress.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/proxy_options.h"
@@ -21,10 +22,15 @@ struct ShaderOptions {
   std::optional<std::string> form;     ///< shadertoy unless set
   std::optional<uint32_t> max_elements;
   std::optional<std::string> up;
+  std::optional<std::string> texture;      ///< of a .ptk file: name or number
+  std::optional<std::string> image_format; ///< of kTexelFormatNames; r2g4b2 unless set
+  std::optional<uint32_t> image_size;      ///< texels along the longest side
 
-  bool any() const {
-    return proxy.proxy != "off" || geometry || form || max_elements || up || proxy.voxels || proxy.rule;
-  }
+  std::vector<std::string> voxel_names() const; ///< given options that apply to voxels only
+  std::vector<std::string> image_names() const; ///< given options that apply to images only
+  /// Names of all given options.
+  std::vector<std::string> names() const;
+  ShaderConfig config() const; ///< throws Error(kUsage) for a limit of 0 elements
 };
 
 /// A shader and its reports.
@@ -36,9 +42,10 @@ struct ShaderExport {
 
 void add_shader_options(CLI::App& verb, ShaderOptions& options);
 
-/// Makes a shader of a .ptk file. The stored proxy is used unless options choose another grid.
-/// Throws Error(kUsage) for unknown geometries and wrong options, Error(kLimitExceeded), with the largest grid that
-/// fits, for shaders with too many array elements.
+/// Makes a shader of the voxels of a .ptk file, of one of its textures or of an image file. A stored proxy is used
+/// unless options choose another grid. Throws Error(kUsage) for unknown geometries and textures and options without
+/// effect, Error(kLimitExceeded), with the largest grid or image that fits, for shaders with too many array elements,
+/// Error(kInput) for damaged images.
 ShaderExport export_shader(const std::string& input, const std::string& output, const ShaderOptions& options,
                            const MemoryBudget& budget, Progress& progress);
 

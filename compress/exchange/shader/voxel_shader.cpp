@@ -98,7 +98,7 @@ bool trace(vec3 o, vec3 d, float t_max, out float t, out ivec3 v, out int leaf, 
     }
     v[a] = i;
   }
-  for (int steps = 0; steps < 4096; ++steps) {
+  for (int steps = 0; steps < STEPS; ++steps) {
     int shift;
     if (voxel_set(v, shift, leaf)) return true;
     int leave = -1, leave_plane = 0;
@@ -208,7 +208,8 @@ std::string constants_text(const Proxy& proxy, const ShaderView& view) {
     return "ivec3(" + std::to_string(v[0]) + ", " + std::to_string(v[1]) + ", " + std::to_string(v[2]) + ")";
   };
   std::string text = "const int LEVELS = " + std::to_string(h.levels) + ";\nconst ivec3 SIZE = " + ivec(h.size) +
-                     ", TOP = " + ivec(h.top) +
+                     ", TOP = " + ivec(h.top) + ";\nconst int STEPS = " +
+                     std::to_string(1 + h.size[0] + h.size[1] + h.size[2]) + // each crosses a plane
                      ";\nconst bool HAS_FULL = " + ((h.flags & voxels::kHasFull) != 0 ? "true" : "false") + ";\n";
   constexpr std::array<const char*, 6> kNames = {"MASKS", "GROUPS", "BLOCKS", "FULL", "POINTERS", "POINTER_BITS"};
   for (size_t i = 0; i < 6; ++i) text += glsl_ints(kNames[i], places[i]);
