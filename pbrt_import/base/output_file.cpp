@@ -198,12 +198,20 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::write(std::span<const std::byte> bytes) {
-  int error = ftruncate(descriptor_.get(), 0) == 0 ? 0 : errno;
+  if (ftruncate(descriptor_.get(), 0) != 0) fail(target_, std::string("cannot write: ") + std::strerror(errno));
+  written_ = 0;
+  append(bytes);
+}
+
+void OutputFile::append(std::span<const std::byte> bytes) {
+  int error = 0;
   for (size_t done = 0; done < bytes.size() && error == 0;) {
-    const ssize_t n = pwrite(descriptor_.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
+    const ssize_t n =
+        pwrite(descriptor_.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(written_ + done));
     if (n >= 0) done += static_cast<size_t>(n);
     if (n < 0 && errno != EINTR) error = errno;
   }
+  written_ += bytes.size();
   if (error == EFBIG) fail(target_, "cannot write: larger than files may be here (see ulimit -f)");
   if (error != 0) fail(target_, std::string("cannot write: ") + std::strerror(error));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <vector>
@@ -9,8 +10,8 @@
 
 namespace packtrace {
 
-/// An output file that is created atomically: the caller writes to path(), or calls write(), and commit() moves the
-/// complete file to the target. Until then the target is untouched.
+/// An output file that is created atomically: the caller writes to path(), or calls write() or append(), and commit()
+/// moves the complete file to the target. Until then the target is untouched.
 ///
 /// If the file system supports it, the file has no name before commit(), so that nothing remains of it however the
 /// process ends. Otherwise it is a temporary file in the target's folder, which the destructor removes; files left by
@@ -34,6 +35,9 @@ public:
   /// Replaces the content of the uncommitted file. Throws Error(kIo), which names the target, on failure.
   void write(std::span<const std::byte> bytes);
 
+  /// Writes behind what write() and append() have written. Throws like write().
+  void append(std::span<const std::byte> bytes);
+
   /// Moves the file to the target. Throws Error(kIo) on failure, or if the target was created meanwhile and force is
   /// not set.
   void commit();
@@ -45,6 +49,7 @@ private:
 
   std::filesystem::path target_;
   Descriptor descriptor_;
+  uint64_t written_ = 0; ///< bytes by write() and append()
   std::filesystem::path path_;
   std::filesystem::path temporary_; ///< its name in the target's folder; empty while it has no name
   bool force_ = false;

@@ -19,13 +19,16 @@ BinaryOutput::BinaryOutput(const std::string& target, bool force, const JsonOutp
   refuse_terminal("a binary file");
 }
 
-void BinaryOutput::write(std::span<const std::byte> bytes) {
-  if (file_) {
-    file_->write(bytes);
-    file_->commit();
-  } else {
+void BinaryOutput::append(std::span<const std::byte> bytes) {
+  if (file_)
+    file_->append(bytes);
+  else
     write_standard_output(bytes);
-  }
+}
+
+void BinaryOutput::write(std::span<const std::byte> bytes) {
+  append(bytes);
+  if (file_) file_->commit();
 }
 
 void refuse_shared_stdout(bool output_to_stdout, const JsonOutput& json) {

@@ -17,7 +17,9 @@ public:
   /// Throws like OutputFile, and Error(kUsage) for "-" if standard output is a terminal or already used by --json.
   BinaryOutput(const std::string& target, bool force, const JsonOutput& json);
 
-  /// Writes the whole output; call it once. Throws Error(kIo) if writing fails.
+  /// Writes a part of the output. Throws Error(kIo) if writing fails.
+  void append(std::span<const std::byte> bytes);
+  /// Writes the rest of the output; call it once. Throws like append().
   void write(std::span<const std::byte> bytes);
 
   /// Stream for human-readable text: standard output, or standard error if the bytes go to standard output.

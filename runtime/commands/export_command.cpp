@@ -121,8 +121,9 @@ std::string name_of(GltfCodec codec) {
   return codec == GltfCodec::kDraco ? kDraco : codec == GltfCodec::kMeshopt ? kMeshopt : kNone;
 }
 
+/// @param main takes what is written of the main file while it is made
 Exported export_file(const ExportOptions& options, const std::string& layout, const MemoryBudget& budget,
-                     Progress& progress) {
+                     Progress& progress, const ByteSink& main) {
   if (layout == kShader) {
     ShaderExport result = export_shader(options.input, options.output, options.shader, budget, progress);
     return {std::move(result.bytes), {}, std::move(result.json), std::move(result.text)};
@@ -145,10 +146,13 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
     names.layout = layout;
     const std::string stem = stem_of(options);
     SceneExport result = layout == kPbrt  ? export_pbrt(file, stem, progress)
-                         : layout == kObj ? export_obj(file, stem, progress)
+                         : layout == kObj ? export_obj(file, stem, progress, main)
                                           : export_streams(file, stem, progress);
-    std::vector<std::byte> bytes = std::move(result.files.back().bytes);
-    result.files.pop_back();
+    std::vector<std::byte> bytes;
+    if (layout != kObj) {
+      bytes = std::move(result.files.back().bytes);
+      result.files.pop_back();
+    }
     return {std::move(bytes), std::move(result.files), to_json(names, result.report), to_text(names, result.report)};
   }
   Vertex16Export result = export_vertex16(file, progress);
@@ -183,7 +187,8 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   refuse_to_replace({options.input});
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const Exported result = export_file(options, layout, globals.memory, progress);
+  const Exported result = export_file(options, layout, globals.memory, progress,
+                                      [&output](std::span<const std::byte> bytes) { output.append(bytes); });
   write_others(options, result.others, globals.force);
   output.write(result.bytes);
   display.finish();

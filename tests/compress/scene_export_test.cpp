@@ -29,6 +29,19 @@ std::filesystem::path write(const TemporaryFolder& folder, const SceneExport& re
   return folder.path() / result.files.back().name;
 }
 
+/// The export with its main file, which is streamed.
+SceneExport whole_obj(const BakedFile& file, const std::string& stem, Progress& progress) {
+  std::vector<std::byte> main;
+  SceneExport result = export_obj(file, stem, progress, [&](std::span<const std::byte> bytes) {
+    main.insert(main.end(), bytes.begin(), bytes.end());
+  });
+  result.files.push_back({stem + ".obj", std::move(main)});
+  uint64_t total = 0;
+  for (const ExportedFile& f : result.files) total += f.bytes.size();
+  EXPECT_EQ(result.report.file_bytes, total);
+  return result;
+}
+
 Scene import_again(const std::filesystem::path& path) {
   Diagnostics diagnostics;
   Progress progress;
@@ -87,7 +100,7 @@ TEST(ObjExport, FacesComeBack) {
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   Progress progress;
   const TemporaryFolder folder;
-  const Scene scene = import_again(write(folder, export_obj(file, "a", progress)));
+  const Scene scene = import_again(write(folder, whole_obj(file, "a", progress)));
   std::multiset<test::WorldFace> after;
   for (const Shape& shape : scene.shapes)
     for (const Triangle& t : scene.meshes[shape.mesh].triangles) {
@@ -107,6 +120,26 @@ TEST(ObjExport, FacesComeBack) {
       mirrored.insert(test::face_of(face));
     }
   EXPECT_EQ(after, mirrored);
+}
+
+/// What the export holds at a time does not grow with the number of instances.
+TEST(ObjExport, InstancesAreStreamed) {
+  Scene scene = test::mixed_scene();
+  ASSERT_FALSE(scene.instances.empty());
+  for (int i = 0; i < 500; ++i) {
+    scene.instances.push_back(scene.instances.back());
+    scene.instances.back().world_from_object[3] += Vec3(1.0f, 0.0f, 0.0f);
+  }
+  const BakedScene baked = test::bake(scene);
+  Progress progress;
+  uint64_t total = 0;
+  size_t largest = 0;
+  export_obj(BakedFile::from_bytes(baked.bytes), "a", progress, [&](std::span<const std::byte> bytes) {
+    total += bytes.size();
+    largest = std::max(largest, bytes.size());
+  });
+  EXPECT_GT(total, uint64_t{3} << 20);
+  EXPECT_LT(largest, size_t{2} << 20);
 }
 
 TEST(StreamExport, ArraysHoldTheLattice) {
@@ -151,7 +184,7 @@ TEST(SceneExports, BytesDoNotDependOnThreads) {
   const BakedScene baked = coarse_scene();
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   Progress progress;
-  for (const auto exports : {export_pbrt, export_obj, export_streams}) {
+  for (const auto exports : {export_pbrt, whole_obj, export_streams}) {
     const SceneExport many = exports(file, "a", progress);
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     const SceneExport again = exports(file, "a", progress);

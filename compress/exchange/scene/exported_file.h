@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,9 @@ struct ExportedFile {
   std::vector<std::byte> bytes;
 };
 
+/// Takes the bytes of a file that is written while it is made, in order.
+using ByteSink = std::function<void(std::span<const std::byte>)>;
+
 /// Statistics of an export to a scene.
 struct SceneReport {
   uint64_t shapes = 0, objects = 0, instances = 0, materials = 0, images = 0, cameras = 0;
@@ -23,7 +28,7 @@ struct SceneReport {
 
 /// An export that consists of several files.
 struct SceneExport {
-  std::vector<ExportedFile> files; ///< the main file last
+  std::vector<ExportedFile> files; ///< the main file last, unless a sink took it
   SceneReport report;
 };
 

@@ -19,8 +19,8 @@ void append_vector(std::string& text, std::string_view keyword, std::span<const 
 
 class ObjWriter {
 public:
-  ObjWriter(const BakedFile& file, const std::string& stem, Progress& progress)
-      : file_(file), stem_(stem), progress_(progress) {
+  ObjWriter(const BakedFile& file, const std::string& stem, Progress& progress, const ByteSink& sink)
+      : file_(file), stem_(stem), progress_(progress), sink_(sink) {
     for (uint32_t i = 0; i < file.sections().materials.size(); ++i)
       names_.push_back(plain_name(file.text(file.sections().materials[i].name), i, false));
   }
@@ -42,10 +42,10 @@ public:
       add_instance(i);
       progress_.advance();
     }
+    flush(0);
     SceneReport& report = result_.report;
     report.materials = names_.size();
     report.moving = !file_.sections().rigid_motion.empty() || !file_.sections().deformation.empty();
-    result_.files.push_back({stem_ + ".obj", bytes_of_text(text_)});
     for (const ExportedFile& f : result_.files) report.file_bytes += f.bytes.size();
     return std::move(result_);
   }
@@ -99,7 +99,9 @@ private:
     const glm::dmat3 normal_map = normal_matrix(map);
     const bool keeps_winding = swaps_handedness(map); // the file's space mirrors once more
     text_ += "o " + plain_name(file_.text(file_.geometries()[instance.geometry].name), number, false) + "\n";
-    for (const PlainPrimitive& part : plain_primitives(file_, instance.geometry)) {
+    if (decoded_ != instance.geometry) // instances of a geometry follow one another
+      parts_ = plain_primitives(file_, decoded_ = instance.geometry);
+    for (const PlainPrimitive& part : parts_) {
       text_ += "usemtl " + names_[file_.sections().material_slots[instance.first_slot + part.material_slot]] + "\n";
       for (const Vec3& p : part.positions) append_vector(text_, "v ", placed(map, p));
       for (const Vec2& uv : part.uvs) append_vector(text_, "vt ", std::span(&uv.x, 2));
@@ -110,8 +112,18 @@ private:
             std::array{static_cast<float>(-turned.x), static_cast<float>(turned.y), static_cast<float>(turned.z)});
       }
       add_faces(part, keeps_winding);
+      constexpr size_t kChunk = size_t{1} << 20;
+      flush(kChunk);
     }
     ++result_.report.shapes;
+  }
+
+  /// Hands the text over if it is longer than some bytes.
+  void flush(size_t above) {
+    if (text_.size() <= above) return;
+    sink_(std::as_bytes(std::span(text_)));
+    result_.report.file_bytes += text_.size();
+    text_.clear();
   }
 
   void add_faces(const PlainPrimitive& part, bool keeps_winding) {
@@ -137,15 +149,18 @@ private:
   const std::string stem_;
   Progress& progress_;
   std::vector<std::string> names_; ///< of the materials
-  std::string text_;
+  const ByteSink& sink_;
+  std::string text_;                ///< not yet handed over
+  uint32_t decoded_ = baked::kNone; ///< geometry of parts_
+  std::vector<PlainPrimitive> parts_;
   uint64_t vertices_ = 0, uvs_ = 0, normals_ = 0; ///< written so far
   SceneExport result_;
 };
 
 } // namespace
 
-SceneExport export_obj(const BakedFile& file, const std::string& stem, Progress& progress) {
-  return ObjWriter(file, stem, progress).run();
+SceneExport export_obj(const BakedFile& file, const std::string& stem, Progress& progress, const ByteSink& sink) {
+  return ObjWriter(file, stem, progress, sink).run();
 }
 
 } // namespace packtrace

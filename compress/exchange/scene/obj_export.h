@@ -10,8 +10,10 @@ namespace packtrace {
 
 /// Exports a baked file as Wavefront OBJ with an MTL file and PNG images. OBJ has no instances: each becomes a group of
 /// triangles in world space, mirrored along x because OBJ is right-handed.
-/// The bytes depend only on the arguments. Throws Error(kCancelled), Error(kLimitExceeded).
+/// The bytes depend only on the arguments. Throws Error(kCancelled), Error(kLimitExceeded), and what the sink throws.
 /// @param stem name of the main file without its ending; STEM.mtl and the folder STEM_files are beside it
-SceneExport export_obj(const BakedFile& file, const std::string& stem, Progress& progress);
+/// @param sink takes the main file in pieces of about a mebibyte, or of one mesh
+/// @return the other files
+SceneExport export_obj(const BakedFile& file, const std::string& stem, Progress& progress, const ByteSink& sink);
 
 } // namespace packtrace
