@@ -289,6 +289,21 @@ TEST(GltfPortable, UsesNoExtension) {
     EXPECT_TRUE(material.pbrMetallicRoughness.baseColorTexture.extensions.empty());
 }
 
+TEST(GltfWeb, RegularMeshesAreStrips) {
+  const BakedScene baked = test::bake(test::scene_of(test::grid_mesh(40)));
+  GltfConfig config = gltf_profile(GltfProfile::kWeb);
+  config.buffer_name = "a.bin";
+  const GltfExport result = export_of(BakedFile::from_bytes(baked.bytes), config);
+  const std::string_view text(reinterpret_cast<const char*>(result.bytes.data()), result.bytes.size());
+  const nlohmann::json json = nlohmann::json::parse(text);
+  const nlohmann::json& primitive = json["meshes"][0]["primitives"][0];
+  constexpr int kTriangleStrip = 5;
+  EXPECT_EQ(primitive.value("mode", 4), kTriangleStrip);
+  const uint64_t indices = json["accessors"][primitive["indices"].get<size_t>()]["count"];
+  EXPECT_GE(indices, result.report.triangles + 2);
+  EXPECT_LT(indices, 2 * result.report.triangles); // a list has three
+}
+
 TEST(GltfWeb, StatesItsErrors) {
   const BakedScene baked = bake_for_shading(scene_with_images());
   const BakedFile file = BakedFile::from_bytes(baked.bytes);

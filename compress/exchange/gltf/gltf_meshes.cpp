@@ -127,14 +127,16 @@ GltfMeshes::Template GltfMeshes::add_draco(const GltfPrimitive& from) {
 }
 
 GltfJson GltfMeshes::add_coded(const PlainPrimitive& plain, const PositionFrame& frame, bool with_uvs) {
-  const MeshoptPrimitive coded = meshopt_primitive(plain, config_.meshopt_normal_bits, uvs_, with_uvs);
-  report_.collapsed_triangles += coded.collapsed_triangles;
-  report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, coded.max_normal_error_degrees);
-  if (coded.indices.empty()) return nullptr;
+  const int normal_bits = config_.meshopt_normal_bits;
+  const MeshoptPrimitive merged = meshopt_primitive(plain, normal_bits, uvs_, with_uvs);
+  report_.collapsed_triangles += merged.collapsed_triangles;
+  report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, merged.max_normal_error_degrees);
+  if (merged.triangles == 0) return nullptr;
+  const MeshoptPrimitive coded = ordered_for_codec(merged, frame, normal_bits, uvs_);
   ++report_.primitives;
-  report_.vertices += coded.lattice.size(), report_.triangles += coded.indices.size() / 3;
+  report_.vertices += coded.lattice.size(), report_.triangles += coded.triangles;
   model_.use_extension("KHR_mesh_quantization", true);
-  return add_meshopt_primitive(coded, frame, config_.meshopt_normal_bits, uvs_, streams_);
+  return add_meshopt_primitive(coded, frame, normal_bits, uvs_, streams_);
 }
 
 /// Adds a geometry whose positions are integers; those whose lattice is too fine stay floats.

@@ -8,6 +8,8 @@
 
 #include <meshoptimizer.h>
 
+#include "compress/exchange/gltf/rail_strip.h"
+
 namespace packtrace {
 namespace {
 
@@ -64,6 +66,39 @@ std::vector<StoredVertex> stored_vertices(const PlainPrimitive& plain, int norma
   return vertices;
 }
 
+/// A primitive with the same vertices in another order, without triangles.
+/// @param order by new number: the vertex
+MeshoptPrimitive with_vertices(const MeshoptPrimitive& from, std::span<const uint32_t> order) {
+  MeshoptPrimitive result;
+  result.triangles = from.triangles, result.collapsed_triangles = from.collapsed_triangles;
+  result.max_normal_error_degrees = from.max_normal_error_degrees;
+  for (const uint32_t vertex : order) {
+    result.lattice.push_back(from.lattice[vertex]);
+    if (!from.normals.empty()) result.normals.push_back(from.normals[vertex]);
+    if (!from.uvs.empty()) result.uvs.push_back(from.uvs[vertex]);
+  }
+  return result;
+}
+
+MeshoptPrimitive as_list(const MeshoptPrimitive& from, std::vector<uint32_t> indices) {
+  std::vector<unsigned> number(from.lattice.size());
+  const size_t used = meshopt_optimizeVertexFetchRemap(number.data(), indices.data(), indices.size(), number.size());
+  std::vector<uint32_t> order(used);
+  for (uint32_t vertex = 0; vertex < number.size(); ++vertex)
+    if (number[vertex] != ~0u) order[number[vertex]] = vertex;
+  MeshoptPrimitive result = with_vertices(from, order);
+  for (uint32_t& index : indices) index = number[index];
+  result.indices = std::move(indices);
+  return result;
+}
+
+MeshoptPrimitive as_strip(const MeshoptPrimitive& from, std::span<const uint32_t> indices) {
+  RailStrip strip = rail_strip(indices, from.lattice.size());
+  MeshoptPrimitive result = with_vertices(from, strip.order);
+  result.strip = std::move(strip.elements);
+  return result;
+}
+
 template <class T>
 std::span<const std::byte> bytes_of_vector(const std::vector<T>& values) {
   return std::as_bytes(std::span(values));
@@ -90,16 +125,8 @@ MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits,
     else
       result.indices.insert(result.indices.end(), {a, b, c});
   }
-  if (result.indices.empty()) return result;
-  meshopt_optimizeVertexCacheStrip(result.indices.data(), result.indices.data(), result.indices.size(), distinct);
-  std::vector<unsigned> order(distinct);
-  const size_t used =
-      meshopt_optimizeVertexFetchRemap(order.data(), result.indices.data(), result.indices.size(), distinct);
-  std::vector<StoredVertex> ordered(used);
-  for (size_t i = 0; i < distinct; ++i)
-    if (order[i] != ~0u) ordered[order[i]] = merged[i];
-  for (uint32_t& index : result.indices) index = order[index];
-  for (const StoredVertex& vertex : ordered) {
+  result.triangles = result.indices.size() / 3;
+  for (const StoredVertex& vertex : merged) {
     result.lattice.push_back(vertex.lattice);
     if (!plain.normals.empty()) result.normals.push_back(vertex.normal);
     if (keep_uvs && !plain.uvs.empty()) result.uvs.push_back(vertex.uv);
@@ -121,6 +148,22 @@ std::optional<PositionFrame> position_frame(const LatticePoint& lo, const Lattic
   if (fits(-kMaxMantissa, kMaxMantissa)) return PositionFrame{Form::kFloat, {}};
   if (extent > kMaxMantissa) return std::nullopt;
   return PositionFrame{Form::kFloat, lo};
+}
+
+MeshoptPrimitive ordered_for_codec(const MeshoptPrimitive& list, const PositionFrame& frame, int normal_bits,
+                                   const UvGrid& uvs) {
+  std::vector<uint32_t> indices(list.indices.size());
+  meshopt_optimizeVertexCacheStrip(indices.data(), list.indices.data(), indices.size(), list.lattice.size());
+  MeshoptPrimitive strip = as_strip(list, indices);
+  MeshoptPrimitive ordered = as_list(list, std::move(indices));
+  const auto coded_bytes = [&](const MeshoptPrimitive& primitive) {
+    GltfModel alone;
+    MeshoptStreams streams(alone);
+    add_meshopt_primitive(primitive, frame, normal_bits, uvs, streams);
+    return streams.finish();
+  };
+  constexpr uint64_t kModeBytes = 9; // of "mode" in the document
+  return coded_bytes(strip) + kModeBytes < coded_bytes(ordered) ? strip : ordered;
 }
 
 GltfJson add_meshopt_primitive(const MeshoptPrimitive& primitive, const PositionFrame& frame, int normal_bits,
@@ -176,8 +219,13 @@ GltfJson add_meshopt_primitive(const MeshoptPrimitive& primitive, const Position
         uvs.step > 0.0 ? streams.add({4, kGltfVertices, {}}, bytes_of_vector(codes), std::move(coordinates))
                        : streams.add({8, kGltfVertices, {}}, bytes_of_vector(primitive.uvs), std::move(coordinates));
   }
-  return {{"attributes", std::move(attributes)},
-          {"indices", streams.add_indices(primitive.indices, primitive.lattice.size())}};
+  constexpr int kTriangleStrip = 5;
+  GltfJson result{{"attributes", std::move(attributes)}};
+  if (primitive.strip.empty())
+    result["indices"] = streams.add_indices(primitive.indices, primitive.lattice.size());
+  else
+    result["indices"] = streams.add_strip(primitive.strip, primitive.lattice.size()), result["mode"] = kTriangleStrip;
+  return result;
 }
 
 } // namespace packtrace

@@ -18,17 +18,19 @@ struct UvGrid {
 };
 
 /// A primitive with the values that it stores: lattice points, codes of normals and texture coordinates. Vertices with
-/// equal values are merged, triangles and vertices ordered for the codec.
+/// equal values are merged. Its triangles are a list or a strip.
 struct MeshoptPrimitive {
   std::vector<LatticePoint> lattice;
   std::vector<std::array<int16_t, 4>> normals; ///< x, y, unit, 0, as the filter OCTAHEDRAL stores them
   std::vector<std::array<float, 2>> uvs;       ///< codes on the UvGrid, or floats
-  std::vector<uint32_t> indices;               ///< three per triangle; those with equal corners are left out
-  uint64_t collapsed_triangles = 0;
+  std::vector<uint32_t> indices;               ///< three per triangle; empty if it is a strip
+  std::vector<std::array<uint32_t, 2>> strip;  ///< pairs of indices; triangles with equal corners join its parts
+  uint64_t triangles = 0;                      ///< without those that join parts of the strip
+  uint64_t collapsed_triangles = 0;            ///< left out, because they have equal corners
   double max_normal_error_degrees = 0.0;
 };
 
-/// Rounds the values of a primitive, merges equal vertices, and orders triangles and vertices.
+/// Rounds the values of a primitive and merges equal vertices; triangles are a list in their order.
 /// @param normal_bits 4..16
 MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits, const UvGrid& uvs, bool keep_uvs);
 
@@ -40,6 +42,10 @@ struct PositionFrame {
 
 /// The smallest form that holds all points from lo to hi; none if their extent exceeds 24 bits.
 std::optional<PositionFrame> position_frame(const LatticePoint& lo, const LatticePoint& hi);
+
+/// The primitive, with triangles and vertices ordered for the codec: as a list or as a strip, whichever is smaller.
+MeshoptPrimitive ordered_for_codec(const MeshoptPrimitive& list, const PositionFrame& frame, int normal_bits,
+                                   const UvGrid& uvs);
 
 /// Adds accessors for the primitive; returns the glTF primitive without a material.
 GltfJson add_meshopt_primitive(const MeshoptPrimitive& primitive, const PositionFrame& frame, int normal_bits,

@@ -8,6 +8,13 @@
 
 namespace packtrace {
 
+namespace {
+
+/// Whether 16-bit indices suffice. 65535 restarts strips in some viewers.
+bool fits_shorts(size_t vertices) { return vertices <= std::numeric_limits<uint16_t>::max(); }
+
+} // namespace
+
 MeshoptStreams::Stream& MeshoptStreams::stream(const Format& format) {
   const auto [place, added] = streams_.try_emplace(format);
   if (added) place->second.view = model_.reserve_view();
@@ -24,9 +31,9 @@ int MeshoptStreams::add(const Format& format, std::span<const std::byte> bytes, 
 }
 
 int MeshoptStreams::add_indices(const std::vector<uint32_t>& indices, size_t vertices) {
-  const bool small = vertices <= std::numeric_limits<uint16_t>::max(); // 65535 restarts strips in some viewers
+  const bool small = fits_shorts(vertices);
   const uint32_t stride = small ? 2 : 4;
-  Stream& to = stream({stride, kGltfIndices, {}});
+  Stream& to = stream({stride, kGltfIndices, {}, true});
   GltfJson accessor{{"bufferView", to.view},
                     {"componentType", small ? kGltfUnsignedShort : kGltfUnsignedInt},
                     {"count", indices.size()},
@@ -36,12 +43,25 @@ int MeshoptStreams::add_indices(const std::vector<uint32_t>& indices, size_t ver
   return model_.add("accessors", std::move(accessor));
 }
 
+int MeshoptStreams::add_strip(std::span<const std::array<uint32_t, 2>> strip, size_t vertices) {
+  const bool small = fits_shorts(vertices);
+  GltfJson accessor{{"componentType", small ? kGltfUnsignedShort : kGltfUnsignedInt}, {"type", "SCALAR"}};
+  std::vector<std::array<uint16_t, 2>> shorts;
+  if (small)
+    for (const auto& [left, right] : strip)
+      shorts.push_back({static_cast<uint16_t>(left), static_cast<uint16_t>(right)});
+  const int number = small ? add({4, kGltfIndices, {}}, std::as_bytes(std::span(shorts)), std::move(accessor))
+                           : add({8, kGltfIndices, {}}, std::as_bytes(strip), std::move(accessor));
+  model_.element("accessors", number)["count"] = 2 * strip.size();
+  return number;
+}
+
 uint64_t MeshoptStreams::finish() {
   uint64_t total = 0;
   meshopt_encodeIndexVersion(1); // the only version of the extension
   meshopt_encodeVertexVersion(0);
   for (auto& [format, stream] : streams_) {
-    const bool is_indices = format.target == kGltfIndices;
+    const bool is_indices = format.list;
     const size_t count = is_indices ? stream.indices.size() : stream.bytes.size() / format.stride;
     std::vector<std::byte> coded(is_indices
                                      ? meshopt_encodeIndexBufferBound(count, std::numeric_limits<uint32_t>::max())

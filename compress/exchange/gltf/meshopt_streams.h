@@ -20,11 +20,12 @@ public:
   explicit MeshoptStreams(GltfModel& model) : model_(model) {}
 
   struct Format {
-    uint32_t stride = 0;     ///< bytes of an element: a multiple of 4, or 2 and 4 for indices
+    uint32_t stride = 0;     ///< bytes of an element: a multiple of 4, or 2 and 4 for a list of triangles
     int target = 0;          ///< kGltfVertices, kGltfIndices or 0
     std::string_view filter; ///< that decoders apply, a literal; empty: none
+    bool list = false;       ///< triangles; otherwise elements of `stride` bytes
     bool operator<(const Format& other) const {
-      return std::tie(stride, target, filter) < std::tie(other.stride, other.target, other.filter);
+      return std::tie(stride, target, filter, list) < std::tie(other.stride, other.target, other.filter, other.list);
     }
   };
 
@@ -34,6 +35,9 @@ public:
   int add(const Format& format, std::span<const std::byte> bytes, GltfJson accessor);
   /// Appends triangles, with 16-bit indices if they fit.
   int add_indices(const std::vector<uint32_t>& indices, size_t vertices);
+
+  /// Appends a triangle strip, coded as vertices whose components are its even and its odd indices.
+  int add_strip(std::span<const std::array<uint32_t, 2>> strip, size_t vertices);
 
   /// Compresses all streams into their views; returns the compressed bytes.
   uint64_t finish();
