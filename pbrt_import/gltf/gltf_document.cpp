@@ -212,6 +212,13 @@ std::span<const std::byte> Document::buffer_bytes(uint64_t number) {
   return bytes.first(static_cast<size_t>(length));
 }
 
+std::span<const std::byte> Document::image_bytes(uint64_t number) {
+  if (const auto found = images_.find(number); found != images_.end()) return found->second;
+  const Value image = element("images", number);
+  const std::optional<Value> uri = image.find("uri");
+  return images_[number] = uri ? uri_bytes(*uri) : view_bytes(image.at("bufferView").integer());
+}
+
 std::span<const std::byte> Document::view_bytes(uint64_t number) {
   if (const auto found = views_.find(number); found != views_.end()) return found->second;
   const Value view = element("bufferViews", number);

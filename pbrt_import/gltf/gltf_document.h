@@ -32,8 +32,9 @@ public:
   /// Bytes of a buffer view, decoded if it is compressed by EXT_meshopt_compression. They live as long as the document.
   std::span<const std::byte> view_bytes(uint64_t view);
 
-  /// Bytes that a URI names: a data URI, or a file beside the document.
-  std::span<const std::byte> uri_bytes(const Value& uri);
+  /// Bytes of an image, which are read once. They live as long as the document.
+  std::span<const std::byte> image_bytes(uint64_t image);
+
   /// Path of the file that a URI names. Throws if it is not a relative path within the document's folder and files
   /// outside are not allowed.
   std::filesystem::path uri_file(const Value& uri) const;
@@ -50,6 +51,8 @@ private:
   void split_binary();
   void check_extensions() const;
   std::span<const std::byte> buffer_bytes(uint64_t buffer);
+  /// Bytes that a URI names: a data URI, or a file beside the document.
+  std::span<const std::byte> uri_bytes(const Value& uri);
   std::span<const std::byte> keep(std::vector<std::byte> bytes);
 
   MeshFileContext context_;
@@ -59,7 +62,7 @@ private:
   std::string_view json_text_;
   std::span<const std::byte> binary_; ///< chunk of a .glb file
   nlohmann::json json_;
-  std::map<uint64_t, std::span<const std::byte>> buffers_, views_; ///< read so far; buffers as long as they are
+  std::map<uint64_t, std::span<const std::byte>> buffers_, views_, images_; ///< read so far; buffers to their ends
   std::vector<std::unique_ptr<std::vector<std::byte>>> kept_;
   MemoryReservation memory_;
 };

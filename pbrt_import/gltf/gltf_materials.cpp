@@ -54,11 +54,9 @@ std::string Materials::image_file(uint64_t number) {
   const Value image = document_.element("images", number);
   const std::optional<Value> uri = image.find("uri");
   if (uri && !uri->text().starts_with("data:")) return document_.uri_file(*uri).string();
-  const std::span<const std::byte> bytes =
-      uri ? document_.uri_bytes(*uri) : document_.view_bytes(image.at("bufferView").integer());
   const std::string name =
       "image " + std::to_string(number) + " of glTF file " + std::to_string(document_.file_number());
-  file_names_.embed(name, bytes);
+  file_names_.embed(name, document_.image_bytes(number));
   return name;
 }
 
@@ -84,12 +82,8 @@ Vec3 Materials::image_average(const Value& info) {
 }
 
 Vec3 Materials::read_average(uint64_t number) {
-  const Value image = document_.element("images", number);
-  const std::optional<Value> uri = image.find("uri");
-  const std::span<const std::byte> bytes =
-      uri ? document_.uri_bytes(*uri) : document_.view_bytes(image.at("bufferView").integer());
   MemoryReservation memory(document_.context().options.memory);
-  return read_image(bytes, false, {}, memory).average;
+  return read_image(document_.image_bytes(number), false, {}, memory).average;
 }
 
 void Materials::read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset) {

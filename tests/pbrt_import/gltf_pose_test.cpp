@@ -251,6 +251,24 @@ TEST(GltfImages, FilesAreReadOnce) {
   EXPECT_EQ(import_file(folder.write("b.gltf", text.dump())).statistics.files_read, many.statistics.files_read);
 }
 
+/// Many materials with one image of a data URI do not take its memory many times.
+TEST(GltfImages, DataUrisAreDecodedOnce) {
+  const SceneFolder folder;
+  std::string image(webp_image());
+  image.resize(size_t{100} << 10, '\0');
+  GltfBuilder gltf;
+  const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const Json material = {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}};
+  for (int i = 0; i < 300; ++i) gltf.json["materials"].push_back(material);
+  gltf.json["images"] = {{{"uri", "data:image/webp;base64," + GltfBuilder::base64(image)}}};
+  gltf.json["textures"] = {{{"source", 0}}};
+  gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"material", 299}});
+  gltf.node({{"mesh", 0}});
+  ImportOptions options;
+  options.memory = MemoryBudget(20u << 20);
+  EXPECT_EQ(import_file(folder.write("a.gltf", gltf.text()), options).text(), "");
+}
+
 TEST(GltfImages, MetalnessIsReducedToItsMean) {
   const SceneFolder folder;
   // Blue is metalness: half of the texels.

@@ -1,6 +1,8 @@
 // Imports of glTF files.
 
+#include <filesystem>
 #include <numbers>
+#include <random>
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
@@ -224,8 +226,8 @@ TEST(GltfMaterials, ColoursMasksAndLight) {
   EXPECT_EQ(absent.statistics.shapes_absent, 1u);
 }
 
-TEST(GltfCompression, MeshoptViewsAreDecoded) {
-  const SceneFolder folder;
+/// A square whose buffer views are compressed by EXT_meshopt_compression.
+GltfBuilder meshopt_square() {
   GltfBuilder gltf;
   const std::vector<uint32_t> indices = {0, 1, 2, 0, 2, 3};
   std::vector<unsigned char> vertices(meshopt_encodeVertexBufferBound(4, 12)),
@@ -249,7 +251,31 @@ TEST(GltfCompression, MeshoptViewsAreDecoded) {
                                       {"componentType", 5125},
                                       {"type", "SCALAR"},
                                       {"count", 6}});
-  const GltfBuilder whole = with_primitive({{"attributes", {{"POSITION", position}}}, {"indices", index}}, gltf);
+  return with_primitive({{"attributes", {{"POSITION", position}}}, {"indices", index}}, gltf);
+}
+
+/// A square compressed by Draco, in buffer view 0.
+GltfBuilder draco_square() {
+  draco::TriangleSoupMeshBuilder soup;
+  soup.Start(2);
+  const int position = soup.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
+  const float a[] = {0, 0, 0}, b[] = {1, 0, 0}, c[] = {1, 1, 0}, d[] = {0, 1, 0};
+  soup.SetAttributeValuesForFace(position, draco::FaceIndex(0), a, b, c);
+  soup.SetAttributeValuesForFace(position, draco::FaceIndex(1), a, c, d);
+  const auto mesh = soup.Finalize();
+  draco::EncoderBuffer buffer;
+  EXPECT_TRUE(draco::Encoder().EncodeMeshToBuffer(*mesh, &buffer).ok());
+  GltfBuilder gltf;
+  const size_t view = gltf.view(std::string_view(buffer.data(), buffer.size()));
+  const Json primitive = {
+      {"attributes", {{"POSITION", gltf.accessor({{"componentType", 5126}, {"type", "VEC3"}, {"count", 4}})}}},
+      {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}}}}}};
+  return with_primitive(primitive, gltf);
+}
+
+TEST(GltfCompression, MeshoptViewsAreDecoded) {
+  const SceneFolder folder;
+  const GltfBuilder whole = meshopt_square();
   const Imported imported = import_gltf(folder, whole);
   EXPECT_EQ(imported.text(), "");
   EXPECT_EQ(only_mesh(imported).triangles.size(), 2u);
@@ -261,26 +287,49 @@ TEST(GltfCompression, MeshoptViewsAreDecoded) {
 
 TEST(GltfCompression, DracoPrimitivesAreDecoded) {
   const SceneFolder folder;
-  draco::TriangleSoupMeshBuilder soup;
-  soup.Start(2);
-  const int position = soup.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
-  const float a[] = {0, 0, 0}, b[] = {1, 0, 0}, c[] = {1, 1, 0}, d[] = {0, 1, 0};
-  soup.SetAttributeValuesForFace(position, draco::FaceIndex(0), a, b, c);
-  soup.SetAttributeValuesForFace(position, draco::FaceIndex(1), a, c, d);
-  const auto mesh = soup.Finalize();
-  draco::EncoderBuffer buffer;
-  ASSERT_TRUE(draco::Encoder().EncodeMeshToBuffer(*mesh, &buffer).ok());
-  GltfBuilder gltf;
-  const size_t view = gltf.view(std::string_view(buffer.data(), buffer.size()));
-  const Json primitive = {
-      {"attributes", {{"POSITION", gltf.accessor({{"componentType", 5126}, {"type", "VEC3"}, {"count", 4}})}}},
-      {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}}}}}};
-  const Imported imported = import_gltf(folder, with_primitive(primitive, gltf));
+  GltfBuilder gltf = draco_square();
+  const Imported imported = import_gltf(folder, gltf);
   EXPECT_EQ(imported.text(), "");
   EXPECT_EQ(only_mesh(imported).triangles.size(), 2u);
-  GltfBuilder damaged = with_primitive(primitive, gltf);
-  damaged.json["bufferViews"][view]["byteLength"] = buffer.size() / 2;
-  EXPECT_TRUE(import_gltf(folder, damaged).reported("KHR_draco_mesh_compression has damaged Draco data"));
+  Json& view = gltf.json["bufferViews"][0];
+  view["byteLength"] = view["byteLength"].get<size_t>() / 2;
+  EXPECT_TRUE(import_gltf(folder, gltf).reported("KHR_draco_mesh_compression has damaged Draco data"));
+}
+
+/// Every bit of compressed buffers, and pairs of bytes, may be wrong.
+TEST(GltfCompression, MutatedBuffersEndWell) {
+  const SceneFolder folder;
+  ImportOptions options;
+  options.memory = MemoryBudget(64u << 20);
+  size_t imported = 0, refused = 0;
+  const auto try_file = [&](const std::string& content) {
+    try {
+      const Imported result = import_file(folder.write("a.glb", content), options);
+      ++(result.text().empty() ? imported : refused);
+    } catch (const Error& error) {
+      ++refused;
+      EXPECT_TRUE(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kUnsupported) << error.what();
+    }
+  };
+  for (const GltfBuilder& gltf : {meshopt_square(), draco_square()}) {
+    const std::string whole = gltf.binary();
+    const size_t buffer = whole.find("BIN") + 4; // behind the name of the chunk
+    ASSERT_LT(buffer, whole.size());
+    std::minstd_rand random(1);
+    for (size_t i = buffer; i < whole.size(); ++i)
+      for (int change = 0; change < 12; ++change) {
+        std::string mutated = whole;
+        if (change < 8) {
+          mutated[i] = static_cast<char>(mutated[i] ^ (1 << change));
+        } else {
+          mutated[i] = static_cast<char>(random());
+          mutated[buffer + random() % (whole.size() - buffer)] = static_cast<char>(random());
+        }
+        try_file(mutated);
+      }
+  }
+  EXPECT_GT(imported, 0u);
+  EXPECT_GT(refused, 0u);
 }
 
 TEST(GltfProblems, AreNamedByTheirPath) {
@@ -345,6 +394,12 @@ TEST(GltfProblems, FilesOutsideTheFolderAreRefused) {
   EXPECT_TRUE(import_with("https://example.org/data.bin", true).reported("is not a file beside the document"));
   EXPECT_FALSE(import_with("%2e%2e/data.bin", true).reported("leads out"));
   EXPECT_TRUE(import_with("none.bin", false).reported("buffers[0].uri names"));
+  const std::string absolute = (folder.path() / "data.bin").string();
+  EXPECT_TRUE(import_with(absolute, false).reported("leads out of the document's folder"));
+  EXPECT_FALSE(import_with(absolute, true).reported("leads out"));
+  std::filesystem::create_symlink(absolute, folder.path() / "inner/link.bin");
+  EXPECT_TRUE(import_with("link.bin", false).reported("leads out of the document's folder"));
+  EXPECT_FALSE(import_with("link.bin", true).reported("leads out"));
 }
 
 TEST(GltfProblems, MemoryIsLimited) {
