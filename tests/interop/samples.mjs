@@ -1,6 +1,7 @@
 // Boxes in every layout that glTF allows: what the public sample models test, made here.
 import fs from "node:fs";
 import path from "node:path";
+import { PNG } from "pngjs";
 import { validate } from "./validate.mjs";
 import { check, json } from "./process.mjs";
 
@@ -44,7 +45,46 @@ class Sample {
   }
 }
 
-/** By name: a function that fills a sample, and the number of triangles. */
+/** A PNG of 2 x 2 pixels as a data URI. */
+function picture() {
+  const png = new PNG({ width: 2, height: 2 });
+  png.data.set([255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 255, 255, 255, 0]);
+  return `data:image/png;base64,${PNG.sync.write(png).toString("base64")}`;
+}
+
+/** Makes the sample's box textured: a material with the picture and texture coordinates. */
+function texture(sample, info = {}, material = {}) {
+  sample.json.images = [{ uri: picture() }];
+  sample.json.samplers = [{ wrapS: 33071, wrapT: 33071 }];
+  sample.json.textures = [{ source: 0, sampler: 0 }];
+  sample.json.materials = [{ pbrMetallicRoughness: { baseColorTexture: { index: 0, ...info } }, ...material }];
+  const view = sample.view(new Float32Array(kCorners.flatMap((c) => [c[0], c[1]])), { target: 34962 });
+  const uvs = sample.accessor({ bufferView: view, componentType: 5126, type: "VEC2", count: 8 });
+  sample.primitive({ attributes: { POSITION: sample.positions(), TEXCOORD_0: uvs }, indices: sample.indices(), material: 0 });
+}
+
+/** Accessor of floats that are no vertices. */
+function floats(sample, values, type, more = {}) {
+  const sizes = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
+  const view = sample.view(new Float32Array(values.flat()));
+  return sample.accessor({ bufferView: view, componentType: 5126, type, count: values.flat().length / sizes[type], ...more });
+}
+
+/** Adds an animation of one channel of node 0 with the keys 0 and 2 s. */
+function animate(sample, path, type, values, interpolation) {
+  const input = floats(sample, [0, 2], "SCALAR", { min: [0], max: [2] });
+  const output = floats(sample, values, type);
+  sample.json.animations = [{ samplers: [{ input, output, interpolation }], channels: [{ sampler: 0, target: { node: 0, path } }] }];
+}
+
+/** The box of the vertices times 1/2, so that something has to double them. */
+const halved = kCorners.map((c) => c.map((v) => v / 2));
+function half(sample) {
+  const view = sample.view(new Float32Array(halved.flat()), { target: 34962 });
+  return sample.accessor({ bufferView: view, componentType: 5126, type: "VEC3", count: 8, min: [0, 0, 0], max: [0.5, 0.5, 0.5] });
+}
+
+/** By name: a function that fills a sample, the number of triangles, and options of packtrace. The box is [0, 1]^3. */
 const kSamples = {
   bytes: [(s) => s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(kTriangles, Uint8Array, 5121) }), 12],
   shorts: [(s) => s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() }), 12],
@@ -85,6 +125,91 @@ const kSamples = {
     const view = s.view(new Uint8Array(kCorners.flatMap((c) => [...c.map((v) => v * 255), 0])), { target: 34962, byteStride: 4 });
     s.primitive({ attributes: { POSITION: s.accessor({ bufferView: view, componentType: 5121, normalized: true, type: "VEC3", count: 8, min: [0, 0, 0], max: [255, 255, 255] }) }, indices: s.indices() });
   }, 12],
+  hierarchy: [(s) => {
+    s.json.nodes = [{ children: [1], scale: [2, 2, 2] }, { children: [2], translation: [0.5, 0, 0] },
+      { mesh: 0, matrix: [0, 0.5, 0, 0, -0.5, 0, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 1] }];
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
+  }, 12],
+  mirrored_node: [(s) => {
+    s.json.nodes[0] = { mesh: 0, scale: [-1, 1, 1], translation: [1, 0, 0] };
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
+  }, 12],
+  two_primitives: [(s) => {
+    const positions = s.positions();
+    s.json.meshes = [{ primitives: [kTriangles.slice(0, 18), kTriangles.slice(18)].map((list) => ({ attributes: { POSITION: positions }, indices: s.indices(list) })) }];
+  }, 12],
+  two_nodes: [(s) => {
+    s.json.nodes = [{ mesh: 0, scale: [0.5, 1, 1] }, { mesh: 0, scale: [0.5, 1, 1], translation: [0.5, 0, 0] }];
+    s.json.scenes[0].nodes = [0, 1];
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
+  }, 12],
+  instances: [(s) => {
+    s.json.extensionsUsed = s.json.extensionsRequired = ["EXT_mesh_gpu_instancing"];
+    const attributes = { TRANSLATION: floats(s, [[0, 0, 0], [0.5, 0, 0]], "VEC3"), SCALE: floats(s, [[0.5, 1, 1], [0.5, 1, 1]], "VEC3") };
+    s.json.nodes[0].extensions = { EXT_mesh_gpu_instancing: { attributes } };
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
+  }, 12],
+  morph: [(s) => {
+    const target = s.view(new Float32Array(halved.flat()), { target: 34962 });
+    s.primitive({ attributes: { POSITION: half(s) }, indices: s.indices(),
+      targets: [{ POSITION: s.accessor({ bufferView: target, componentType: 5126, type: "VEC3", count: 8, min: [0, 0, 0], max: [0.5, 0.5, 0.5] }) }] });
+    s.json.meshes[0].weights = [1];
+  }, 12],
+  morph_animated: [(s) => {
+    kSamples.morph[0](s);
+    animate(s, "weights", "SCALAR", [0, 2], "LINEAR");
+  }, 12, ["--time", "1"]],
+  skin: [(s) => {
+    s.json.nodes = [{ mesh: 0, skin: 0 }, { scale: [2, 2, 2] }];
+    s.json.scenes[0].nodes = [0, 1];
+    s.json.skins = [{ joints: [1], inverseBindMatrices: floats(s, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "MAT4") }];
+    const joints = s.view(new Uint8Array(32), { target: 34962, byteStride: 4 });
+    const weights = s.view(new Float32Array(kCorners.flatMap(() => [1, 0, 0, 0])), { target: 34962 });
+    s.primitive({ attributes: { POSITION: half(s), JOINTS_0: s.accessor({ bufferView: joints, componentType: 5121, type: "VEC4", count: 8 }),
+      WEIGHTS_0: s.accessor({ bufferView: weights, componentType: 5126, type: "VEC4", count: 8 }) }, indices: s.indices() });
+  }, 12],
+  ...Object.fromEntries(["LINEAR", "STEP", "CUBICSPLINE"].map((interpolation) => [`animation_${interpolation.toLowerCase()}`, [(s) => {
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
+    const zero = [0, 0, 0], from = interpolation === "STEP" ? zero : [-1, 0, 0], to = [1, 0, 0];
+    animate(s, "translation", "VEC3", interpolation === "CUBICSPLINE" ? [zero, from, zero, zero, to, zero] : [from, to], interpolation);
+  }, 12, ["--time", "1"]]])),
+  textured: [(s) => texture(s), 12],
+  texture_transform: [(s) => {
+    s.json.extensionsUsed = ["KHR_texture_transform"];
+    texture(s, { extensions: { KHR_texture_transform: { offset: [0.25, 0], scale: [2, 2], rotation: 0.5 } } });
+  }, 12],
+  textured_mask: [(s) => texture(s, {}, { alphaMode: "MASK", alphaCutoff: 0.25, doubleSided: true }), 12],
+  ...Object.fromEntries(Object.entries({
+    KHR_materials_unlit: {}, KHR_materials_emissive_strength: { emissiveStrength: 3 }, KHR_materials_transmission: { transmissionFactor: 1 },
+    KHR_materials_specular: { specularFactor: 0.5 }, KHR_materials_ior: { ior: 1.3 },
+  }).map(([extension, values]) => [extension.replace("KHR_materials_", ""), [(s) => {
+    s.json.extensionsUsed = [extension];
+    s.json.materials = [{ emissiveFactor: extension.endsWith("strength") ? [1, 1, 1] : [0, 0, 0], extensions: { [extension]: values } }];
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 0 });
+  }, 12]])),
+  camera_and_lights: [(s) => {
+    s.json.extensionsUsed = ["KHR_lights_punctual"];
+    s.json.extensions = { KHR_lights_punctual: { lights: ["point", "directional", "spot"].map((type) => ({ type, ...(type === "spot" ? { spot: {} } : {}) })) } };
+    s.json.cameras = [{ type: "perspective", perspective: { yfov: 1, znear: 0.1 } }, { type: "orthographic", orthographic: { xmag: 2, ymag: 1, znear: 0, zfar: 10 } }];
+    s.json.nodes.push(...[0, 1, 2].map((light) => ({ translation: [0, 3, 0], extensions: { KHR_lights_punctual: { light } } })));
+    s.json.nodes.push({ camera: 0, translation: [0, 0, 5] }, { camera: 1, translation: [0, 0, 5] });
+    s.json.scenes[0].nodes = s.json.nodes.map((_, i) => i);
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
+  }, 12],
+  colours_and_tangents: [(s) => {
+    const colours = s.view(new Uint8Array(32).fill(200), { target: 34962, byteStride: 4 });
+    const normals = s.view(new Float32Array(kCorners.flatMap(() => [0, 0, 1])), { target: 34962 });
+    const tangents = s.view(new Float32Array(kCorners.flatMap(() => [1, 0, 0, 1])), { target: 34962 });
+    s.primitive({ attributes: { POSITION: s.positions(),
+      COLOR_0: s.accessor({ bufferView: colours, componentType: 5121, normalized: true, type: "VEC4", count: 8 }),
+      NORMAL: s.accessor({ bufferView: normals, componentType: 5126, type: "VEC3", count: 8 }),
+      TANGENT: s.accessor({ bufferView: tangents, componentType: 5126, type: "VEC4", count: 8 }) }, indices: s.indices() });
+  }, 12],
+  names: [(s) => {
+    s.json.nodes[0].name = "Würfel\u0000\"\\ \ud83d\ude00";
+    s.json.materials = [{ name: "" }, { name: "" }];
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 1 });
+  }, 12],
   ...Object.fromEntries(["OPAQUE", "MASK", "BLEND"].map((alphaMode) => [`alpha_${alphaMode.toLowerCase()}`, [(s) => {
     s.json.materials = [{ alphaMode, ...(alphaMode === "MASK" ? { alphaCutoff: 0.25 } : {}), pbrMetallicRoughness: { baseColorFactor: [1, 0.5, 0, 0.75] } }];
     s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 0 });
@@ -92,12 +217,12 @@ const kSamples = {
 };
 
 export async function readSamples(packtrace, work) {
-  for (const [name, [fill, triangles]] of Object.entries(kSamples)) {
+  for (const [name, [fill, triangles, options = []]] of Object.entries(kSamples)) {
     const sample = new Sample(), file = path.join(work, `box_${name}.gltf`);
     fill(sample);
     sample.write(file);
     await validate(file, `box ${name}`);
-    const info = json(packtrace, "info", file);
+    const info = json(packtrace, "info", file, ...options);
     check(info.triangles === triangles, `box ${name} has its triangles`, `${info.triangles} instead of ${triangles}`);
     check(info.problems.errors + info.problems.warnings === 0, `box ${name} is read without problems`);
     const bounds = JSON.stringify(info.bounds), expected = JSON.stringify({ hi: [0, 1, 1], lo: [-1, 0, 0] });

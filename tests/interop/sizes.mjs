@@ -1,0 +1,160 @@
+// Sizes and measured errors of glTF files that packtrace, gltfpack and glTF-Transform make of a scene.
+// Usage: node sizes.mjs PACKTRACE WORK SCENE.pbrt [BITS]
+//   BITS  of positions over the whole scene: gltfpack's -vp (default 16); packtrace bakes with the largest step that has its position error
+// All begin with one portable file of a fine lattice, and errors are those against it.
+import fs from "node:fs";
+import path from "node:path";
+import { NodeIO } from "@gltf-transform/core";
+import { ALL_EXTENSIONS } from "@gltf-transform/extensions";
+import { MeshoptDecoder } from "meshoptimizer";
+import draco3d from "draco3dgltf";
+import { bytesOf, json, run, tool } from "./process.mjs";
+
+const multiply = (a, b) => {
+  const out = new Array(16).fill(0);
+  for (let c = 0; c < 4; ++c) for (let r = 0; r < 4; ++r) for (let k = 0; k < 4; ++k) out[4 * c + r] += a[4 * k + r] * b[4 * c + k];
+  return out;
+};
+function compose(t, q, s) {
+  const [x, y, z, w] = q;
+  return [(1 - 2 * (y * y + z * z)) * s[0], 2 * (x * y + z * w) * s[0], 2 * (x * z - y * w) * s[0], 0,
+    2 * (x * y - z * w) * s[1], (1 - 2 * (x * x + z * z)) * s[1], 2 * (y * z + x * w) * s[1], 0,
+    2 * (x * z + y * w) * s[2], 2 * (y * z - x * w) * s[2], (1 - 2 * (x * x + y * y)) * s[2], 0, ...t, 1];
+}
+
+/** Unit normals by the inverse transpose of a map, which may mirror. */
+function turned(m, n) {
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const x = m.slice(0, 3), y = m.slice(4, 7), z = m.slice(8, 11), yz = cross(y, z), zx = cross(z, x), xy = cross(x, y);
+  const sign = Math.sign(x[0] * yz[0] + x[1] * yz[1] + x[2] * yz[2]);
+  const v = [0, 1, 2].map((k) => sign * (n[0] * yz[k] + n[1] * zx[k] + n[2] * xy[k]));
+  const length = Math.hypot(...v);
+  return v.map((c) => c / length);
+}
+
+/** Vertices in the world that triangles use: positions, and normals or zeros. */
+async function vertices(file) {
+  const io = new NodeIO().registerExtensions(ALL_EXTENSIONS).registerDependencies({
+    "meshopt.decoder": MeshoptDecoder, "draco3d.decoder": await draco3d.createDecoderModule(),
+  });
+  await MeshoptDecoder.ready;
+  const document = await io.read(file), positions = [], normals = [];
+  const visit = (node, parent) => {
+    const world = multiply(parent, node.getMatrix());
+    const maps = [], batch = node.getExtension("EXT_mesh_gpu_instancing");
+    if (batch) {
+      const [t, r, s] = ["TRANSLATION", "ROTATION", "SCALE"].map((name) => batch.getAttribute(name));
+      for (let i = 0; i < (t ?? r ?? s).getCount(); ++i)
+        maps.push(multiply(world, compose(t?.getElement(i, []) ?? [0, 0, 0], r?.getElement(i, []) ?? [0, 0, 0, 1], s?.getElement(i, []) ?? [1, 1, 1])));
+    } else {
+      maps.push(world);
+    }
+    for (const primitive of node.getMesh()?.listPrimitives() ?? []) {
+      const p = primitive.getAttribute("POSITION"), n = primitive.getAttribute("NORMAL"), v = [], u = [];
+      for (let i = 0; i < p.getCount(); ++i) {
+        p.getElement(i, v);
+        n?.getElement(i, u);
+        for (const m of maps) {
+          for (let k = 0; k < 3; ++k) positions.push(m[k] * v[0] + m[4 + k] * v[1] + m[8 + k] * v[2] + m[12 + k]);
+          normals.push(...(n ? turned(m, u) : [0, 0, 0]));
+        }
+      }
+    }
+    for (const child of node.listChildren()) visit(child, world);
+  };
+  for (const node of document.getRoot().listScenes()[0].listChildren()) visit(node, compose([0, 0, 0], [0, 0, 0, 1], [1, 1, 1]));
+  return { positions: Float64Array.from(positions), normals: Float32Array.from(normals) };
+}
+
+/** Errors of vertices against their nearest one of the same file as others wrote it; of a sample of them. */
+function errors(reference, test, reach) {
+  const count = test.positions.length / 3, size = 1 << 22, heads = new Int32Array(size).fill(-1), next = new Int32Array(count);
+  const cell = (v) => Math.floor(v / reach);
+  const hash = (x, y, z) => ((Math.imul(x, 73856093) ^ Math.imul(y, 19349663) ^ Math.imul(z, 83492791)) >>> 0) & (size - 1);
+  for (let i = 0; i < count; ++i) {
+    const h = hash(...[0, 1, 2].map((k) => cell(test.positions[3 * i + k])));
+    next[i] = heads[h], heads[h] = i;
+  }
+  const all = reference.positions.length / 3, stride = Math.max(1, Math.floor(all / 200000));
+  let squares = 0, largest = 0, sampled = 0, lost = 0, angles = 0, widest = 0, angled = 0;
+  for (let i = 0; i < all; i += stride) {
+    const p = reference.positions.subarray(3 * i, 3 * i + 3), n = reference.normals.subarray(3 * i, 3 * i + 3);
+    const near = [];
+    let least = Infinity;
+    for (let x = -1; x <= 1; ++x) for (let y = -1; y <= 1; ++y) for (let z = -1; z <= 1; ++z)
+      for (let k = heads[hash(cell(p[0]) + x, cell(p[1]) + y, cell(p[2]) + z)]; k >= 0; k = next[k]) {
+        const distance = Math.hypot(test.positions[3 * k] - p[0], test.positions[3 * k + 1] - p[1], test.positions[3 * k + 2] - p[2]);
+        if (distance <= reach) near.push([distance, k]);
+        least = Math.min(least, distance);
+      }
+    ++sampled;
+    if (!(least <= reach)) { ++lost; continue; }
+    squares += least * least, largest = Math.max(largest, least);
+    if (n[0] === 0 && n[1] === 0 && n[2] === 0) continue;
+    let angle = Infinity; // of the best normal at that place: vertices at creases have several
+    for (const [distance, k] of near)
+      if (distance <= least + 0.25 * reach) {
+        const m = test.normals.subarray(3 * k, 3 * k + 3);
+        angle = Math.min(angle, Math.atan2(Math.hypot(n[1] * m[2] - n[2] * m[1], n[2] * m[0] - n[0] * m[2], n[0] * m[1] - n[1] * m[0]),
+                                           n[0] * m[0] + n[1] * m[1] + n[2] * m[2]));
+      }
+    angles += angle * angle, widest = Math.max(widest, angle), ++angled;
+  }
+  const degrees = 180 / Math.PI;
+  return { position_rms: Math.sqrt(squares / (sampled - lost)), position_max: largest, lost: lost / sampled,
+    normal_rms: angled ? degrees * Math.sqrt(angles / angled) : 0, normal_max: degrees * widest };
+}
+
+/** Bytes of a file by what they hold: compressed views by their use, images, JSON and the rest. */
+function streams(file) {
+  const bytes = fs.readFileSync(file), length = bytes.readUInt32LE(12), gltf = JSON.parse(bytes.subarray(20, 20 + length));
+  const uses = {}, of = {};
+  for (const mesh of gltf.meshes ?? [])
+    for (const primitive of mesh.primitives) {
+      for (const [name, accessor] of Object.entries(primitive.attributes)) uses[gltf.accessors[accessor].bufferView] ??= name;
+      if (primitive.indices !== undefined) uses[gltf.accessors[primitive.indices].bufferView] ??= "indices";
+      const draco = primitive.extensions?.KHR_draco_mesh_compression;
+      if (draco) uses[draco.bufferView] = "Draco";
+    }
+  for (const image of gltf.images ?? []) uses[image.bufferView] = "images";
+  for (const [i, view] of (gltf.bufferViews ?? []).entries()) {
+    const use = uses[i] ?? "other", coded = view.extensions?.EXT_meshopt_compression ?? view;
+    of[use] = (of[use] ?? 0) + coded.byteLength;
+  }
+  return { ...of, JSON: length };
+}
+
+const [packtrace, work, scene, bits = "16"] = process.argv.slice(2);
+const name = path.basename(scene, ".pbrt"), at = (ending) => path.join(work, `${name}.${ending}`);
+fs.mkdirSync(work, { recursive: true });
+const bake = ["--for", "shading", "--lod", "off", "--force", "-q"];
+run(packtrace, "bake", scene, "-o", at("fine.ptk"), ...bake);
+const { hi, lo } = json(packtrace, "info", at("fine.ptk")).bounds;
+const step = Math.max(...hi.map((v, k) => v - lo[k])) / (2 ** Number(bits) - 1);
+run(packtrace, "bake", scene, "-o", at("fine.ptk"), "--grid-step-abs", String(step / 16), ...bake);
+run(packtrace, "export", at("fine.ptk"), "-o", at("portable.glb"), "--profile", "portable", "--force", "-q");
+run(tool("gltfpack"), "-i", at("portable.glb"), "-o", at("gltfpack.glb"), "-cc", "-mi", "-vp", bits);
+for (const codec of ["meshopt", "draco"])
+  run(tool("gltf-transform"), "optimize", at("portable.glb"), at(`transform_${codec}.glb`), "--compress", codec, "--texture-compress", "webp", "--simplify", "false");
+const reference = await vertices(at("portable.glb")), reach = 4 * step;
+const measure = async (ending) => errors(reference, await vertices(at(ending)), reach);
+const measured = { gltfpack: await measure("gltfpack.glb") };
+let own = step; // the largest step with gltfpack's position error
+for (let round = 0; round < 4; ++round) {
+  run(packtrace, "bake", scene, "-o", at("ptk"), "--grid-step-abs", String(own), ...bake);
+  run(packtrace, "export", at("ptk"), "-o", at("web.glb"), "--profile", "web", "--force", "-q");
+  measured.web = await measure("web.glb");
+  const ratio = measured.gltfpack.position_rms / measured.web.position_rms;
+  if (ratio > 0.995) break;
+  own *= 0.99 * ratio;
+}
+run(packtrace, "export", at("ptk"), "-o", at("exchange.glb"), "--instancing", "--normal-bits", "8", "--webp-psnr", "40", "--force", "-q");
+console.log(`${name}: steps of ${step.toPrecision(3)}, packtrace ${own.toPrecision(3)}; errors in gltfpack's steps and degrees: rms, largest`);
+for (const ending of ["gltfpack", "transform_meshopt", "transform_draco", "web", "exchange"]) {
+  const file = at(`${ending}.glb`), e = measured[ending] ?? (await measure(`${ending}.glb`));
+  const parts = Object.entries(streams(file)).map(([use, bytes]) => `${use} ${(bytes / 1000).toFixed(0)}`);
+  console.log(`${ending}: ${(bytesOf(file) / 1000).toFixed(0)} kB (${parts.join(", ")}); position ${(e.position_rms / step).toFixed(2)}, ` +
+    `${(e.position_max / step).toFixed(2)}; normal ${e.normal_rms.toFixed(2)}, ${e.normal_max.toFixed(2)}${e.lost > 0 ? `; ${(100 * e.lost).toFixed(2)} % of vertices not found` : ""}`);
+}
+const best = Math.min(...["gltfpack", "transform_meshopt"].map((ending) => bytesOf(at(`${ending}.glb`))));
+console.log(`web takes ${(bytesOf(at("web.glb")) / best).toFixed(2)} of the smallest meshopt file`);
