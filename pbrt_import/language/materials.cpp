@@ -168,6 +168,9 @@ uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureP
   for (const std::string_view map : {"normalmap", "Normal"})
     if (kind != "mix" && parameters.has(map)) recipe.flags |= kNormalMap;
   if (kind != "mix" && parameters.find_float("bumpmap")) recipe.flags |= kNormalMap;
+  if (shading_ && kind != "mix" && (recipe.flags & kNormalMap) != 0)
+    parameters.context().reporter.warning(
+        parameters.context().place, "bump and normal maps are not used: surfaces are shaded as if they were smooth");
   if (!graph_.constant_value(recipe.albedo)) recipe.flags |= kAlbedoTexture;
   for (const std::string_view parameter : parameter_names(kind))
     parameters.check(parameter, parameter_kind(kind, parameter));

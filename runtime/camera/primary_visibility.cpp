@@ -9,7 +9,6 @@
 #include "runtime/camera/surface_motion.h"
 #include "runtime/camera/tiles.h"
 #include "runtime/trace/ray_offset.h"
-#include "runtime/trace/source/albedo_lookup.h"
 #include "runtime/trace/view_tracer.h"
 
 namespace packtrace {
@@ -36,9 +35,9 @@ struct RayBatch {
 class PrimaryTracer {
 public:
   PrimaryTracer(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
-                const PreviousFrame& previous, GBuffer& out)
+                const PreviousFrame& previous, const TextureFilter& textures, GBuffer& out)
       : source_(source), tracer_(tracer), space_(tracer.space()), now_(now), motion_(source, tracer, now, previous),
-        out_(out) {}
+        textures_(textures), out_(out) {}
 
   bool sees_motion() const { return motion_.any(); }
 
@@ -191,7 +190,9 @@ private:
     out_.position[pixel] = Vec3(c.position.at(i));
     out_.geometric_normal[pixel] = Vec3(facing);
     out_.normal[pixel] = shading_normal(attributes, *hit.placement, facing);
-    out_.albedo[pixel] = surface_albedo(source_, hit.geometry, hit.triangle, attributes.material, Vec2(c.u[i], c.v[i]));
+    const float width = pixel_width(now_, view_z) * textures_.width_px * static_cast<float>(space_.scale());
+    out_.albedo[pixel] = surface_albedo(source_, textures_.pyramids, hit, attributes.material, Vec2(c.u[i], c.v[i]),
+                                        {batch.rays[i].direction, Vec3(facing), width});
     out_.instance[pixel] = hit.placement->instance;
     out_.triangle[pixel] = hit.triangle;
     out_.material[pixel] = attributes.material;
@@ -216,6 +217,7 @@ private:
   const UnitSpace space_;
   const PrimaryCamera& now_;
   const SurfaceMotion motion_;
+  const TextureFilter textures_;
   GBuffer& out_;
   std::vector<RayHit> view_hits_; ///< of trace_view()
 };
@@ -235,11 +237,16 @@ bool approach_scene(CameraRay& ray) {
   return false;
 }
 
+float pixel_width(const PrimaryCamera& camera, float view_z) {
+  const auto spread = static_cast<float>(camera.pixel_spread());
+  return camera.projection() == Projection::kOrthographic ? spread : spread * view_z;
+}
+
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
-                   const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress) {
+                   const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress, const TextureFilter& textures) {
   if (gbuffer.size != now.size() || gbuffer.view_z.size() != now.size().pixels()) gbuffer.resize(now.size());
   gbuffer.pixel_spread = static_cast<float>(now.pixel_spread());
-  PrimaryTracer primary(source, tracer, now, previous, gbuffer);
+  PrimaryTracer primary(source, tracer, now, previous, textures, gbuffer);
   gbuffer.previous_z.resize(primary.sees_motion() ? now.size().pixels() : 0);
   progress.begin("primary rays", now.size().pixels());
   if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer)) primary.trace_view(*view, progress);

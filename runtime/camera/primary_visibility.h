@@ -7,6 +7,7 @@
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/camera/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
+#include "runtime/trace/surface_albedo.h"
 
 namespace packtrace {
 
@@ -47,9 +48,14 @@ struct PreviousFrame {
 /// the same for any number of threads. Throws Error(kCancelled), and Error(kUsage) for previous transforms that are not
 /// one per instance.
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
-                   const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress);
+                   const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress,
+                   const TextureFilter& textures = {});
 
-/// Does the same if only the camera moved.
+/// Width that a pixel covers at a depth, across the ray; world units.
+/// @param view_z as in GBuffer::view_z
+float pixel_width(const PrimaryCamera& camera, float view_z);
+
+/// Does the same if only the camera moved, with textures looked up at points.
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PrimaryCamera& previous, GBuffer& gbuffer, Progress& progress);
 

@@ -1,6 +1,7 @@
 #include "runtime/frame/frame_loop.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/frame/shaded_filter.h"
 #include "runtime/frame/surface_layers.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
@@ -31,6 +33,14 @@ uint64_t count_hits(const GBuffer& g) {
 void forget_motion(GBuffer& gbuffer) {
   gbuffer.motion_px.assign(gbuffer.motion_px.size(), Vec2(0));
   gbuffer.previous_z.clear();
+}
+
+/// Side of the square of the image that a camera ray stands for in the textures' filter. Camera rays of a still view
+/// share the pixel, so that its mean is as sharp as that of points.
+/// @param still_frame number of frames since something moved
+float footprint_px(const FrameConfig& config, uint32_t still_frame) {
+  if (!config.jitters()) return 1.0f;
+  return 1.0f / std::sqrt(static_cast<float>(still_frame / kFramesPerOffset + 1));
 }
 
 FrameConfig validated(const FrameConfig& config, const FrameScene& scene) {
@@ -89,6 +99,7 @@ void FrameLoop::reset() {
   state_.reset();
   denoiser_.reset();
   adaptive_.clear();
+  shaded_mean_.clear();
 }
 
 void FrameLoop::configure(const FrameConfig& config) {
@@ -157,6 +168,7 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
     }
     if (still_frames_ == saved.still_frames) break;
   }
+  if (config_.shades() && config_.denoise) shaded_mean_.keep_surfaces(gbuffer_);
   camera_ = camera;
   view_.emplace(camera, config_.traced_size());
   next_number_ = saved.next_number;
@@ -183,7 +195,10 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
   const PreviousFrame before{moved_on ? *view_ : view,
                              moved_on ? state_.previous_transforms() : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};
-  trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen);
+  if (config_.shades() && !shade_scene_) shade_scene_ = std::make_unique<ShadeScene>(*scene().source);
+  const TextureFilter textures{config_.shades() ? &shade_scene_->textures() : nullptr,
+                               footprint_px(config_, still_frames_)};
+  trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen, textures);
   traced_view_.emplace(view);
   report_.times.primary_s = tracing.seconds();
   report_.primary_rays = gbuffer_.size.pixels();
@@ -203,17 +218,24 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
 }
 
 /// Shades what the camera rays hit. Its tiles do not count in the progress, but it can cancel them.
-void FrameLoop::shade_frame(Progress& progress) {
+/// @param changed something other than the camera has moved
+void FrameLoop::shade_frame(bool changed, Progress& progress) {
   Progress unseen([&progress](std::string_view, uint64_t, uint64_t) { progress.advance(0); });
   const Stopwatch shading;
-  if (!shade_scene_) shade_scene_ = std::make_unique<ShadeScene>(*scene().source);
   shade_scene_->turn_lights(config_.shade.light_turn);
-  const ShadeSamples samples{config_.ao.seed, next_number_, ao_radius(config_.ao, traced_source().world_bounds())};
+  const ShadeSamples samples{config_.ao.seed, next_number_, ao_radius(config_.ao, traced_source().world_bounds()),
+                             footprint_px(config_, still_frames_)};
   report_.shade_rays = trace_shading(state_.camera_source(), *tracers().front(), *shade_scene_, *traced_view_, gbuffer_,
                                      config_.shade, samples, shaded_, unseen);
-  if (report_.moved || lights_turned_) shaded_mean_.clear();
+  changed = changed || lights_turned_;
   lights_turned_ = false;
-  shaded_mean_.add(shaded_);
+  ShadedHistory history = ShadedHistory::kSamePixels;
+  if (report_.moved || changed) {
+    history = changed ? ShadedHistory::kChanged : ShadedHistory::kMotion;
+    if (!config_.denoise) history = ShadedHistory::kNone;
+  }
+  shaded_mean_.add(shaded_, gbuffer_, history);
+  if (config_.denoise) shaded_mean_.keep_surfaces(gbuffer_);
   report_.times.shade_s += shading.seconds();
 }
 
@@ -295,7 +317,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   if (config_.jitters()) raw_.samples = 1;
   report_.times.ao_s += tracing.seconds();
 
-  if (config_.shades()) shade_frame(progress);
+  if (config_.shades()) shade_frame(changed, progress);
 
   const Stopwatch layering;
   if (moved) layers_.clear();
@@ -340,6 +362,15 @@ std::span<const float> FrameLoop::accumulated_ao(std::vector<float>& raw_mean, P
   return denoised.ao;
 }
 
+/// Writes the shaded layers, without noise if there is a denoiser.
+void FrameLoop::resolve_shading(std::span<const float> ao, RenderedImage& image) {
+  if (!config_.denoise) return packtrace::resolve_shading(config_, shaded_mean_.pixels(), ao, image);
+  if (still_frames_ > 0) layers_.write_guides(gbuffer_, guides_);
+  const GBuffer& mean = still_frames_ > 0 ? guides_ : gbuffer_;
+  const ShadedGuides guides{mean.size, mean.view_z, mean.normal, mean.instance, layers_.albedos(gbuffer_)};
+  packtrace::resolve_shading(config_, filter_shading(shaded_mean_.pixels(), guides), ao, image);
+}
+
 /// Writes the views of the last frame; motion is that since the last image.
 void FrameLoop::resolve_views(RenderedImage& image) {
   views_.resolve(config_, gbuffer_, raw_, denoised_, still_frames_ + 1, image);
@@ -377,12 +408,12 @@ void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
     times.upsample_s += upsampling.seconds();
     const Stopwatch filtering;
     layers_.resolve(config_, gbuffer_, full_ao, raw, image);
-    if (config_.shades()) shaded_mean_.resolve(config_, full_ao, image);
+    if (config_.shades()) resolve_shading(full_ao, image);
     times.resolve_s += filtering.seconds();
   } else {
     const Stopwatch filtering;
     layers_.resolve(config_, gbuffer_, ao, raw_.ao, image);
-    if (config_.shades()) shaded_mean_.resolve(config_, ao, image);
+    if (config_.shades()) resolve_shading(ao, image);
     times.resolve_s += filtering.seconds();
   }
   if (config_.view_layers) resolve_views(image);

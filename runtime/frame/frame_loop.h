@@ -89,7 +89,8 @@ private:
   bool traces(uint32_t still_frame) const;
   SamplePlan sample_plan(const GBuffer& shaded, std::span<const float> limits);
   void add_lod_layers(const PrimaryCamera& view);
-  void shade_frame(Progress& progress);
+  void shade_frame(bool changed, Progress& progress);
+  void resolve_shading(std::span<const float> ao, RenderedImage& image);
   std::span<const float> accumulated_ao(std::vector<float>& raw_mean, PictureReport& report);
   void resolve_views(RenderedImage& image);
   void resolve_surfaces(RenderedImage& image) const;

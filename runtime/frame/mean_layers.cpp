@@ -123,6 +123,17 @@ void MeanLayers::write_guides(const GBuffer& last, GBuffer& guides) const {
   });
 }
 
+std::vector<Vec3> MeanLayers::albedos(const GBuffer& last) const {
+  std::vector<Vec3> albedos(size_.pixels());
+  for_each_image_row(size_.height, [&](uint32_t y) {
+    for (size_t i = size_t{y} * size_.width, end = i + size_.width; i < end; ++i) {
+      const Sums sum = sums(last, i);
+      albedos[i] = sum.hits > 0.0f ? sum.albedo / sum.hits : Vec3(0.0f);
+    }
+  });
+  return albedos;
+}
+
 void MeanLayers::resolve(const FrameConfig& config, const GBuffer& last, std::span<const float> ao,
                          std::span<const float> raw, RenderedImage& image) const {
   const uint32_t factor = config.supersample, layers = config.plain_layers;

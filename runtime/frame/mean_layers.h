@@ -27,6 +27,10 @@ public:
   /// @param last of the last add()
   void write_guides(const GBuffer& last, GBuffer& guides) const;
 
+  /// Mean albedo of each traced pixel; black where all frames miss.
+  /// @param last of the last add()
+  std::vector<Vec3> albedos(const GBuffer& last) const;
+
   /// Instance of each traced pixel's first hit; kNoInstance where all frames miss.
   /// @param last of the last add()
   std::span<const uint32_t> instances(const GBuffer& last) const { return kept() ? instance_ : last.instance; }

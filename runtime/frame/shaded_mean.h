@@ -4,35 +4,69 @@
 #include <span>
 #include <vector>
 
+#include "runtime/camera/gbuffer.h"
 #include "runtime/frame/frame_config.h"
 #include "runtime/frame/rendered_image.h"
 #include "runtime/shade/path_tracer.h"
 
 namespace packtrace {
 
-/// Mean of shaded frames, per traced pixel.
+/// What the frames of a traced pixel have in common.
+struct ShadedPixel {
+  Vec3 direct{0.0f}, specular{0.0f}, ambient{0.0f}; ///< means, linear sRGB radiance
+  float direct_square = 0.0f;                       ///< mean of the squared luminance of `direct`
+  float specular_square = 0.0f;
+  float direct_frames = 0.0f; ///< length of the history, fractional after a movement
+  float specular_frames = 0.0f;
+  float ambient_frames = 0.0f;
+};
+
+/// How a frame continues the ones before.
+enum class ShadedHistory : uint8_t {
+  kNone,       ///< it begins anew
+  kSamePixels, ///< nothing has moved: plain means
+  kMotion,     ///< the camera has moved: surfaces take their means along
+  kChanged,    ///< so have things or lights: the means are followed for a few frames only
+};
+
+/// Means of shaded frames, per traced pixel.
 class ShadedMean {
 public:
-  void clear() { frames_ = 0; }
-  bool empty() const { return frames_ == 0; }
+  void clear() { pixels_.clear(), surfaces_.clear(); }
+  bool empty() const { return pixels_.empty(); }
 
-  /// Adds a frame of the same size as the others since clear().
-  void add(const ShadedFrame& frame);
+  /// Adds a frame of the same size as the others since clear(). Where something has moved, a pixel continues the means
+  /// of the 2 x 2 pixels around the place where the frame before saw the same point (GBuffer::motion_px), as far as
+  /// their instance, normal and depth agree. Direct light is taken relative to the albedo, so that textures stay sharp.
+  /// What is seen by reflection moves otherwise than the surface: its means follow for fewer frames, and within the
+  /// range of the new frame's 3 x 3 pixels. The ambient light has no noise and begins anew.
+  /// @param gbuffer of the frame, of which motion is read
+  void add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history);
 
-  /// Box-filters the means into the layers pbr, direct and specular of an image.
-  /// @param ao denoised, one value per traced pixel; negative: none
-  void resolve(const FrameConfig& config, std::span<const float> ao, RenderedImage& image) const;
+  std::span<const ShadedPixel> pixels() const { return pixels_; }
 
   std::vector<std::byte> save() const;
   /// @return false if the bytes are not those of save() for that number of pixels
   bool restore(size_t pixels, std::span<const std::byte> bytes);
+  /// Keeps what the next frame that moves compares with; without it, that frame begins anew.
+  /// @param gbuffer of the last frame
+  void keep_surfaces(const GBuffer& gbuffer);
 
 private:
-  struct Means {
-    Vec3 direct{0.0f}, specular{0.0f}, ambient{0.0f};
+  struct Surface {
+    float view_z = 0.0f;
+    uint32_t instance = kNoInstance;
+    Vec3 normal{0.0f}, albedo{0.0f};
   };
-  uint32_t frames_ = 0;
-  std::vector<Means> means_;
+  ShadedPixel reprojected(const GBuffer& gbuffer, size_t pixel, int x, int y) const;
+
+  std::vector<ShadedPixel> pixels_, before_;
+  std::vector<Surface> surfaces_; ///< of pixels_
 };
+
+/// Box-filters shaded pixels into the layers pbr, direct and specular of an image.
+/// @param ao denoised, one value per traced pixel; negative: none
+void resolve_shading(const FrameConfig& config, std::span<const ShadedPixel> pixels, std::span<const float> ao,
+                     RenderedImage& image);
 
 } // namespace packtrace

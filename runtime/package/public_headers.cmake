@@ -118,8 +118,10 @@ set(packtrace_public_headers
   runtime/trace/make_tracer.h
   runtime/trace/movers.h
   runtime/trace/ray_tracer.h
+  runtime/trace/surface_albedo.h
   runtime/trace/source/float_source.h
   runtime/trace/source/lod_source.h
   runtime/trace/source/packed_source.h
   runtime/trace/source/scene_source.h
+  runtime/trace/source/texture_pyramids.h
   runtime/trace/unit_space.h)

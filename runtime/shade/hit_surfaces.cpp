@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "runtime/trace/ray_offset.h"
-#include "runtime/trace/source/albedo_lookup.h"
+#include "runtime/trace/surface_albedo.h"
 
 namespace packtrace {
 namespace {
@@ -15,7 +15,7 @@ bool is_outer(const Material& material, bool back_face) {
 
 } // namespace
 
-void HitSurfaces::look_up(std::span<const Ray> rays, std::span<const RayHit> hits,
+void HitSurfaces::look_up(std::span<const Ray> rays, std::span<const RayHit> hits, std::span<const float> widths,
                           std::vector<HitPoint>& points) const {
   std::vector<SurfaceQuery> places(hits.size());
   std::vector<SurfaceAttributes> attributes(hits.size());
@@ -51,7 +51,9 @@ void HitSurfaces::look_up(std::span<const Ray> rays, std::span<const RayHit> hit
         point.normal = Vec3(normal * ((glm::dot(normal, facing) < 0.0 ? -1.0 : 1.0) / size));
     }
     point.material = attributes[i].material, point.instance = placement.instance;
-    point.albedo = surface_albedo(source_, surface.geometry, surface.triangle, point.material, places[i].barycentrics);
+    const float width = widths.empty() ? 0.0f : unit_length(widths[i]);
+    point.albedo = surface_albedo(source_, &textures_, surface, point.material, places[i].barycentrics,
+                                  {Vec3(glm::normalize(direction)), point.geometric, width});
     point.offset = static_cast<float>(ray_offset(surface, space, position, facing) * space.inverse_scale());
     point.outer = is_outer(source_.materials()[point.material], back);
   }

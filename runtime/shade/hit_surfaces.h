@@ -5,6 +5,7 @@
 
 #include "runtime/camera/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
+#include "runtime/trace/source/texture_pyramids.h"
 
 namespace packtrace {
 
@@ -22,11 +23,14 @@ struct HitPoint {
 /// Looks up the surfaces of hits.
 class HitSurfaces {
 public:
-  HitSurfaces(const SceneSource& source, const RayTracer& tracer) : source_(source), tracer_(tracer) {}
+  HitSurfaces(const SceneSource& source, const RayTracer& tracer, const TexturePyramids& textures)
+      : source_(source), tracer_(tracer), textures_(textures) {}
 
   /// @param rays, hits as many; all hits are valid
+  /// @param widths of the rays' cones at the hits (RayFootprint), world units; empty: textures are looked up at points
   /// @param points receives as many elements
-  void look_up(std::span<const Ray> rays, std::span<const RayHit> hits, std::vector<HitPoint>& points) const;
+  void look_up(std::span<const Ray> rays, std::span<const RayHit> hits, std::span<const float> widths,
+               std::vector<HitPoint>& points) const;
 
   /// The surface of a pixel that the camera hits.
   HitPoint of_pixel(const GBuffer& gbuffer, size_t pixel) const;
@@ -52,6 +56,7 @@ public:
 private:
   const SceneSource& source_;
   const RayTracer& tracer_;
+  const TexturePyramids& textures_;
 };
 
 } // namespace packtrace

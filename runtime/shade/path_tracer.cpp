@@ -10,6 +10,7 @@
 #include "runtime/ao/hash.h"
 #include "runtime/ao/hemisphere.h"
 #include "runtime/ao/sampler.h"
+#include "runtime/camera/primary_visibility.h"
 #include "runtime/camera/tiles.h"
 #include "runtime/shade/hit_surfaces.h"
 #include "runtime/shade/shadow_rays.h"
@@ -25,6 +26,7 @@ struct PathVertex {
   HitPoint point;
   Vec3 direction{0.0f};  ///< of the ray that reached it, unit length
   float distance = 0.0f; ///< that it came, world units
+  float width = 0.0f;    ///< of the ray's cone at the point, world units
   Vec3 throughput{1.0f};
   uint32_t pixel = 0; ///< in the tile's list
   uint32_t reflections = 0, transmissions = 0;
@@ -85,6 +87,7 @@ struct PathMemory {
   std::vector<PathVertex> vertices, next;
   std::vector<Ray> rays, hit_rays;
   std::vector<RayHit> hits, valid_hits;
+  std::vector<float> widths;
   std::vector<HitPoint> points;
   ShadowRays shadows;
 };
@@ -101,7 +104,8 @@ public:
   PathTracer(const SceneSource& source, const RayTracer& tracer, const ShadeScene& scene, const PrimaryCamera& camera,
              const GBuffer& gbuffer, const ShadeConfig& config, const ShadeSamples& samples, ShadedFrame& frame)
       : tracer_(tracer), scene_(scene), lights_(scene.lights()), camera_(camera), gbuffer_(gbuffer), config_(config),
-        samples_(samples), surfaces_(source, tracer), samplers_(samples.seed), frame_(frame) {}
+        samples_(samples), surfaces_(source, tracer, scene.textures()), samplers_(samples.seed),
+        spread_((pixel_width(camera, 2.0f) - pixel_width(camera, 1.0f)) * samples.width_px), frame_(frame) {}
 
   uint64_t trace_tile(const Tile& tile, PathMemory& m, const Progress& progress) const {
     m.pixels.clear();
@@ -152,6 +156,7 @@ private:
       vertex.point = surfaces_.of_pixel(gbuffer_, pixel.index);
       vertex.direction = direction;
       vertex.pixel = i;
+      vertex.width = pixel_width(camera_, gbuffer_.view_z[pixel.index]) * samples_.width_px;
       m.vertices.push_back(vertex);
     }
   }
@@ -298,6 +303,7 @@ private:
     const bool reflects = random(place, PathSamplers::kLightChoice, m, place.sample).y < parts.share;
     PathVertex next;
     next.pixel = vertex.pixel;
+    next.width = vertex.width;
     next.reflections = vertex.reflections + (reflects ? 1 : 0);
     next.transmissions = vertex.transmissions + (reflects ? 0 : 1);
     Vec3 i;
@@ -332,11 +338,13 @@ private:
   void follow(PathMemory& m) const {
     m.hits.resize(m.rays.size());
     tracer_.closest_hits(m.rays, kCameraRays, RayOrder::kIncoherent, m.hits);
-    m.vertices.clear(), m.hit_rays.clear(), m.valid_hits.clear();
+    m.vertices.clear(), m.hit_rays.clear(), m.valid_hits.clear(), m.widths.clear();
     for (size_t i = 0; i < m.rays.size(); ++i) {
       PathVertex& next = m.next[i];
       if (m.hits[i].valid()) {
         next.distance = surfaces_.world_length(m.hits[i].t);
+        next.width += spread_ * next.distance;
+        m.widths.push_back(next.width);
         m.vertices.push_back(next), m.hit_rays.push_back(m.rays[i]), m.valid_hits.push_back(m.hits[i]);
         continue;
       }
@@ -347,7 +355,7 @@ private:
               : 1.0f;
       m.pixels[next.pixel].specular += next.throughput * lights_.background(next.direction) * weight;
     }
-    surfaces_.look_up(m.hit_rays, m.valid_hits, m.points);
+    surfaces_.look_up(m.hit_rays, m.valid_hits, m.widths, m.points);
     for (size_t i = 0; i < m.vertices.size(); ++i) m.vertices[i].point = m.points[i];
   }
 
@@ -360,6 +368,8 @@ private:
   const ShadeSamples& samples_;
   const HitSurfaces surfaces_;
   const PathSamplers samplers_;
+  /// Growth of a path's cone per distance. Reflection and transmission keep it: they are taken as those of planes.
+  const float spread_;
   ShadedFrame& frame_;
 };
 

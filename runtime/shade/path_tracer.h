@@ -25,6 +25,7 @@ struct ShadeSamples {
   uint64_t seed = 0;
   uint64_t frame = 0;          ///< number of the frame in the pixels' sequences
   float ambient_radius = 1.0f; ///< world units: reach of the rays that occlude the ambient light behind mirrors
+  float width_px = 1.0f;       ///< TextureFilter::width_px
 };
 
 /// Traces the paths of one frame: from each pixel's surface along mirror and transmission directions, with shadow rays

@@ -6,6 +6,7 @@
 #include "runtime/shade/bsdf.h"
 #include "runtime/shade/light_set.h"
 #include "runtime/shade/shadow_rays.h"
+#include "runtime/trace/source/texture_pyramids.h"
 
 namespace packtrace {
 
@@ -19,11 +20,14 @@ public:
   /// LightSet::turn().
   void turn_lights(float degrees) { lights_.turn(degrees); }
   const DirectionalAlbedo& albedo(uint32_t material) const { return albedos_[albedo_of_[material]]; }
+  /// The textures with their mip levels.
+  const TexturePyramids& textures() const { return textures_; }
   /// What light may pass.
   Glass glass() const { return glass_; }
 
 private:
   LightSet lights_;
+  TexturePyramids textures_;
   std::vector<uint32_t> albedo_of_; ///< by material
   std::vector<DirectionalAlbedo> albedos_;
   Glass glass_ = Glass::kNone;

@@ -36,7 +36,7 @@ void ShadowRays::pass_glass(const RayTracer& tracer, const HitSurfaces& surfaces
       open_rays_[kept++] = open_rays_[i];
     }
     open_rays_.resize(kept);
-    surfaces.look_up(hit_rays_, valid_, points_);
+    surfaces.look_up(hit_rays_, valid_, {}, points_);
     open_.clear();
     kept = 0;
     for (size_t i = 0; i < valid_.size(); ++i) {

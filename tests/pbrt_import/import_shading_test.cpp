@@ -161,6 +161,18 @@ TEST(ShadedMaterials, SayOnceWhatTheyLeaveOut) {
   }
 }
 
+TEST(ShadedMaterials, SayOnceThatBumpMapsAreNotUsed) {
+  const SceneFolder folder;
+  const std::string bumpy = "Material \"matte\" \"texture bumpmap\" \"b\"" + std::string(kTriangle);
+  const std::string world = "Texture \"b\" \"float\" \"constant\" " + bumpy + "\n" + bumpy;
+  const Imported shaded = import_shaded(folder, world);
+  uint64_t lines = 0;
+  for (const Diagnostic& diagnostic : shaded.diagnostics)
+    lines += diagnostic.message.find("bump and normal maps are not used") != std::string::npos;
+  EXPECT_EQ(lines, 1u) << shaded.text();
+  EXPECT_FALSE(import_text(folder, "WorldBegin " + world + " WorldEnd").reported("bump and normal maps"));
+}
+
 TEST(ShadedMaterials, ValuesOutOfRangeAreReported) {
   const SceneFolder folder;
   for (const auto& [material, words] : std::initializer_list<std::pair<const char*, const char*>>{

@@ -8,7 +8,7 @@ bool surface_present(const SceneSource& source, uint32_t instance, uint32_t tria
   const bool all_rays = (material.flags & kAlphaMask) && material.alpha_mask != kNoMask;
   const bool shadows = occlusion_ray && (material.flags & kShadowAlphaMask) && material.shadow_alpha_mask != kNoMask;
   if (!all_rays && !shadows) return true;
-  const Vec2 uv = source.uv(source.instances()[instance].geometry, triangle, barycentrics);
+  const Vec2 uv = interpolated_uv(source.corner_uvs(source.instances()[instance].geometry, triangle), barycentrics);
   if (all_rays && !source.mask(material.alpha_mask).opaque(uv)) return false;
   return !shadows || source.mask(material.shadow_alpha_mask).opaque(uv);
 }

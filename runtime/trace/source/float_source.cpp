@@ -115,12 +115,12 @@ std::optional<Vec3> FloatSource::shading_normal(uint32_t geometry, uint32_t tria
   return Vec3(n / length);
 }
 
-Vec2 FloatSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
+std::array<Vec2, 3> FloatSource::corner_uvs(uint32_t geometry, uint32_t triangle) const {
   const Part& part = part_of(geometry, triangle);
-  if (part.mesh->uvs.empty()) return Vec2(0);
+  if (part.mesh->uvs.empty()) return {Vec2(0), Vec2(0), Vec2(0)};
   const Triangle v = part.triangle(triangle - part.first_triangle);
   const auto& uvs = part.mesh->uvs;
-  return uvs[v.x] * (1.0f - barycentrics.x - barycentrics.y) + uvs[v.y] * barycentrics.x + uvs[v.z] * barycentrics.y;
+  return {uvs[v.x], uvs[v.y], uvs[v.z]};
 }
 
 bool FloatSource::may_emit(uint32_t instance) const {

@@ -22,7 +22,7 @@ public:
   void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const override;
   uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
-  Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
+  std::array<Vec2, 3> corner_uvs(uint32_t geometry, uint32_t triangle) const override;
   float position_error(uint32_t) const override { return 0.0f; }
   std::span<const PlacedGeometry> instances() const override { return instances_; }
   std::span<const Material> materials() const override { return scene_.materials; }

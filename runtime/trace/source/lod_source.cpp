@@ -144,9 +144,9 @@ void LodSource::look_up(std::span<const SurfaceQuery> places, std::span<SurfaceA
   });
 }
 
-Vec2 LodSource::uv(uint32_t blas, uint32_t triangle, Vec2 barycentrics) const {
+std::array<Vec2, 3> LodSource::corner_uvs(uint32_t blas, uint32_t triangle) const {
   const BlasCluster& c = find(blas, triangle);
-  return interpolated_uv(view(c), triangle - c.first_triangle, barycentrics);
+  return packtrace::corner_uvs(view(c), triangle - c.first_triangle);
 }
 
 SurfaceDetail LodSource::detail_of(uint32_t instance, uint32_t triangle) const {

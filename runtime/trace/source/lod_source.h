@@ -47,7 +47,7 @@ public:
   uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t blas, uint32_t triangle, Vec2 barycentrics) const override;
   void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const override;
-  Vec2 uv(uint32_t blas, uint32_t triangle, Vec2 barycentrics) const override;
+  std::array<Vec2, 3> corner_uvs(uint32_t blas, uint32_t triangle) const override;
   float position_error(uint32_t blas) const override { return source_.position_error(blas_[blas].geometry); }
   SurfaceDetail detail_of(uint32_t instance, uint32_t triangle) const override;
   std::span<const PlacedGeometry> instances() const override { return instances_; }

@@ -29,11 +29,10 @@ std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t tri
   return TriangleNormals(cluster, triangle).at(barycentrics);
 }
 
-Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics) {
-  if (!cluster.has_uvs()) return Vec2(0);
+std::array<Vec2, 3> corner_uvs(const ClusterView& cluster, uint32_t triangle) {
+  if (!cluster.has_uvs()) return {Vec2(0), Vec2(0), Vec2(0)};
   const Triangle v = cluster.triangle(triangle);
-  return cluster.uv(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.uv(v.y) * barycentrics.x +
-         cluster.uv(v.z) * barycentrics.y;
+  return {cluster.uv(v.x), cluster.uv(v.y), cluster.uv(v.z)};
 }
 
 PackedSource::PackedSource(const BakedFile& file)
@@ -83,9 +82,9 @@ void PackedSource::look_up(std::span<const SurfaceQuery> places, std::span<Surfa
   });
 }
 
-Vec2 PackedSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
+std::array<Vec2, 3> PackedSource::corner_uvs(uint32_t geometry, uint32_t triangle) const {
   const ClusterView cluster = file_.cluster(geometry, file_.cluster_of_triangle(geometry, triangle));
-  return interpolated_uv(cluster, triangle - cluster.record().first_triangle, barycentrics);
+  return packtrace::corner_uvs(cluster, triangle - cluster.record().first_triangle);
 }
 
 float PackedSource::position_error(uint32_t geometry) const {

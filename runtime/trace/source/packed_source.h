@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "compress/format/shading/shading_codec.h"
@@ -26,8 +27,9 @@ struct TriangleNormals {
 /// @param triangle, barycentrics as in TriangleNormals
 std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics);
 
-/// Returns interpolated texture coordinates; (0,0) if the cluster has none.
-Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics);
+/// Returns the texture coordinates of a triangle's vertices; (0,0) if the cluster has none.
+/// @param triangle number in the cluster
+std::array<Vec2, 3> corner_uvs(const ClusterView& cluster, uint32_t triangle);
 
 /// A baked file as a SceneSource: everything but the tables below is read from the packed clusters on demand. Triangles
 /// and vertices are numbered in the order of clusters; a vertex on a cluster border appears once per cluster, with the
@@ -42,7 +44,7 @@ public:
   uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const override;
-  Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
+  std::array<Vec2, 3> corner_uvs(uint32_t geometry, uint32_t triangle) const override;
   float position_error(uint32_t geometry) const override;
   SurfaceDetail detail_of(uint32_t instance, uint32_t triangle) const override;
   std::span<const PlacedGeometry> instances() const override { return instances_; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -34,6 +35,13 @@ struct SurfaceAttributes {
   bool has_normal = false;
   Vec3 normal{0.0f};
 };
+
+/// Interpolates texture coordinates.
+/// @param barycentrics weights of the second and third corner
+inline Vec2 interpolated_uv(const std::array<Vec2, 3>& corners, Vec2 barycentrics) {
+  return corners[0] * (1.0f - barycentrics.x - barycentrics.y) + corners[1] * barycentrics.x +
+         corners[2] * barycentrics.y;
+}
 
 /// Memory of environment maps' pixels.
 inline uint64_t map_bytes(std::span<const EnvironmentMap> maps) {
@@ -78,8 +86,8 @@ public:
   /// @param out as many elements as `places`
   virtual void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const;
 
-  /// Interpolated texture coordinates; (0,0) if the geometry has none.
-  virtual Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const = 0;
+  /// Texture coordinates of a triangle's vertices; (0,0) if the geometry has none.
+  virtual std::array<Vec2, 3> corner_uvs(uint32_t geometry, uint32_t triangle) const = 0;
 
   /// Bound of |decoded - source| per axis in object units; 0 for floats. See docs/accuracy.md.
   virtual float position_error(uint32_t geometry) const = 0;

@@ -33,7 +33,7 @@ public:
   /// The times from movements to their pictures on the screen.
   const InputLatency& latency() const;
 
-  struct State; ///< of window.cpp
+  struct State; ///< of window_state.h
 
 private:
   std::unique_ptr<State> state_;

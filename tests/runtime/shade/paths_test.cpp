@@ -140,7 +140,7 @@ public:
     const auto local = [&](Vec3 v) { return Vec3(glm::dot(v, t), glm::dot(v, b), glm::dot(v, n)); };
     const Vec3 o = local(to_viewer);
     const Vec3 kept = Vec3(1.0f) - bench_.shade_scene.albedo(point.material).at(o.z);
-    const HitSurfaces surfaces(bench_.source, bench_.tracer);
+    const HitSurfaces surfaces(bench_.source, bench_.tracer, bench_.shade_scene.textures());
     std::vector<Ray> rays;
     std::vector<Vec3> diffuse, specular;
     for (uint32_t s = 0; s < samples; ++s) {
@@ -158,7 +158,7 @@ public:
       DVec3 further(0.0);
       if (hits[s].valid()) {
         std::vector<HitPoint> found;
-        surfaces.look_up({&rays[s], 1}, {&hits[s], 1}, found);
+        surfaces.look_up({&rays[s], 1}, {&hits[s], 1}, {}, found);
         emitted = found[0].outer ? scene_.materials[found[0].material].shading.emission : Vec3(0.0f);
         if (depth > 0 && specular[s] != Vec3(0.0f))
           further = reflected_light(found[0], -rays[s].direction, depth - 1, 1);
@@ -196,7 +196,7 @@ TEST(PathTracer, AgreesWithBruteForce) {
   const ShadedFrame frame = bench.shade(camera, size, config, 128);
   const PrimaryCamera primary(camera, size);
   BruteForce brute(scene, bench);
-  const HitSurfaces surfaces(bench.source, bench.tracer);
+  const HitSurfaces surfaces(bench.source, bench.tracer, bench.shade_scene.textures());
   double difference = 0.0, total = 0.0;
   std::vector<double> errors; // by pixel
   DVec3 ours(0.0), theirs(0.0);

@@ -53,6 +53,72 @@ TEST_F(ShadedFrames, ConvergeToTheMean) {
   EXPECT_LT(after_32, 0.02);
 }
 
+TEST_F(ShadedFrames, AreDenoised) {
+  FrameConfig config = config_;
+  config.jitter = false, config.view = FrameView::kPbr;
+  config.shade.light_samples = 1;
+  FrameConfig raw = config;
+  raw.denoise = false;
+  const RenderedImage truth = still(raw, 512);
+  EXPECT_LT(error(still(config, 1), truth), 0.6 * error(still(raw, 1), truth));
+  EXPECT_LT(error(still(config, 8), truth), 0.9 * error(still(raw, 8), truth));
+  EXPECT_LT(error(still(config, 256), truth), 1.1 * error(still(raw, 256), truth)); // the filter fades
+}
+
+TEST_F(ShadedFrames, TakeTheirMeansAlongWithTheCamera) {
+  const FloatSource source(scene_);
+  const auto last_of_path = [&](const FrameConfig& config, int frames, bool forget) {
+    FrameLoop loop({&source, nullptr, {}}, config);
+    Progress progress;
+    for (int i = frames - 1; i >= 0; --i) {
+      if (forget) loop.reset();
+      loop.next_frame(camera(0.5 + 0.01 * i), 0.0, progress);
+    }
+    RenderedImage image;
+    PictureReport report;
+    loop.resolve(image, report);
+    return image;
+  };
+  FrameConfig raw = config_;
+  raw.denoise = raw.jitter = false;
+  const RenderedImage truth = still(raw, 512);
+  const double followed = error(last_of_path(config_, 24, false), truth),
+               alone = error(last_of_path(config_, 24, true), truth);
+  EXPECT_LT(followed, 0.75 * alone);
+}
+
+TEST_F(ShadedFrames, FollowLightsThatTurn) {
+  Light sun;
+  sun.kind = LightKind::kDistant, sun.radiance = Vec3(3.0f), sun.direction = glm::normalize(Vec3(1, 1, -1));
+  scene_.lights.push_back(sun);
+  const FloatSource source(scene_);
+  FrameConfig config = config_;
+  FrameLoop loop({&source, nullptr, {}}, config);
+  Progress progress;
+  for (int i = 0; i < 32; ++i) loop.next_frame(camera(), 0.0, progress);
+  loop.turn_lights(150.0f);
+  for (int i = 0; i < 24; ++i) loop.next_frame(camera(), 0.0, progress);
+  RenderedImage turned;
+  PictureReport report;
+  loop.resolve(turned, report);
+  config.shade.light_turn = 150.0f;
+  const RenderedImage fresh = still(config, 56), before = still(config_, 56);
+  EXPECT_LT(error(turned, fresh), 0.25 * error(before, fresh)); // 5 of 29 frames are older
+}
+
+TEST_F(ShadedFrames, ForgetOnReset) {
+  const FloatSource source(scene_);
+  FrameLoop loop({&source, nullptr, {}}, config_);
+  Progress progress;
+  for (int i = 0; i < 3; ++i) loop.next_frame(camera(0.6), 0.0, progress);
+  loop.reset();
+  loop.next_frame(camera(), 0.0, progress);
+  RenderedImage image;
+  PictureReport report;
+  loop.resolve(image, report);
+  EXPECT_EQ(image.pbr, still(config_, 1).pbr);
+}
+
 TEST_F(ShadedFrames, OcclusionDarkensTheAmbientLightOnly) {
   FrameConfig config = config_;
   config.jitter = false;
@@ -91,6 +157,7 @@ TEST_F(ShadedFrames, ContinueFromTheirSavedState) {
   const auto finish = [&](FrameLoop& loop) {
     Progress progress;
     for (int i = 0; i < 3; ++i) loop.next_frame(camera(), 0.0, progress);
+    for (int i = 0; i < 2; ++i) loop.next_frame(camera(0.51), 0.0, progress);
     RenderedImage image;
     PictureReport report;
     loop.resolve(image, report);

@@ -47,13 +47,16 @@ struct ShadeBench {
   explicit ShadeBench(const Scene& scene) : source(scene), tracer(source, {}), shade_scene(source) {}
 
   /// The mean of some frames.
-  ShadedFrame shade(const Camera& camera, ImageSize size, const ShadeConfig& config, uint32_t frames) {
+  /// @param width_px TextureFilter::width_px; 0: textures are looked up at points
+  ShadedFrame shade(const Camera& camera, ImageSize size, const ShadeConfig& config, uint32_t frames,
+                    float width_px = 1.0f) {
     const PrimaryCamera primary(camera, size);
     Progress progress;
-    trace_primary(source, tracer, primary, primary, gbuffer, progress);
+    trace_primary(source, tracer, primary, {primary}, gbuffer, progress, {&shade_scene.textures(), width_px});
     ShadedFrame sum, frame;
     ShadeSamples samples;
     samples.ambient_radius = 1.0f;
+    samples.width_px = width_px;
     for (uint32_t i = 0; i < frames; ++i) {
       samples.frame = i;
       trace_shading(source, tracer, shade_scene, primary, gbuffer, config, samples, frame, progress);

@@ -58,7 +58,7 @@ TEST(FloatSource, UvFollowsThePointThroughSwappedWinding) {
   for (uint32_t t = 0; t < 2; ++t) {
     const Triangle v = decoded.triangles[t];
     const Vec3 p = decoded.positions[v.x] * 0.25f + decoded.positions[v.y] * 0.25f + decoded.positions[v.z] * 0.5f;
-    const Vec2 uv = source.uv(0, t, barycentrics);
+    const Vec2 uv = interpolated_uv(source.corner_uvs(0, t), barycentrics);
     EXPECT_NEAR(uv.x, -p.x, 1e-6f);
     EXPECT_NEAR(uv.y, p.y, 1e-6f);
   }
@@ -91,7 +91,7 @@ TEST(FloatSource, ObjectsMergeTheirShapesAndKeepMaterials) {
   EXPECT_EQ(source.material_of(0, 13), 2u);
   EXPECT_EQ(decoded.positions[decoded.triangles[2].x].x, 10.0f);
   EXPECT_FALSE(source.shading_normal(0, 5, {0, 0}).has_value());
-  EXPECT_EQ(source.uv(0, 5, {0.5f, 0.5f}), Vec2(0));
+  EXPECT_EQ(interpolated_uv(source.corner_uvs(0, 5), {0.5f, 0.5f}), Vec2(0));
 }
 
 TEST(FloatSource, RejectsReferencesOutOfRange) {

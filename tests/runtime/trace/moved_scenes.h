@@ -98,7 +98,9 @@ public:
     return still_.material_of(instance, triangle);
   }
   std::optional<Vec3> shading_normal(uint32_t, uint32_t, Vec2) const override { return std::nullopt; }
-  Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 at) const override { return still_.uv(geometry, triangle, at); }
+  std::array<Vec2, 3> corner_uvs(uint32_t geometry, uint32_t triangle) const override {
+    return still_.corner_uvs(geometry, triangle);
+  }
   float position_error(uint32_t geometry) const override { return still_.position_error(geometry); }
   std::span<const PlacedGeometry> instances() const override { return still_.instances(); }
   std::span<const Material> materials() const override { return still_.materials(); }

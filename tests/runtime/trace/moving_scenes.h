@@ -28,8 +28,8 @@ public:
   std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override {
     return source_.shading_normal(geometry, triangle, barycentrics);
   }
-  Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override {
-    return source_.uv(geometry, triangle, barycentrics);
+  std::array<Vec2, 3> corner_uvs(uint32_t geometry, uint32_t triangle) const override {
+    return source_.corner_uvs(geometry, triangle);
   }
   float position_error(uint32_t geometry) const override { return source_.position_error(geometry); }
   std::span<const PlacedGeometry> instances() const override { return instances_; }

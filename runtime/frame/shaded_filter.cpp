@@ -1,0 +1,191 @@
+#include "runtime/frame/shaded_filter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "runtime/shade/bsdf.h"
+
+namespace packtrace {
+namespace {
+
+constexpr int kPasses = 4;
+constexpr float kDark = 0.02f;       ///< least albedo that direct light is taken relative to
+constexpr float kLuminances = 3.0f;  ///< standard deviations by which neighbours may differ
+constexpr float kLongHistory = 4.0f; ///< frames from which a pixel's own samples tell its noise
+constexpr float kFading = 8.0f;      ///< frames from which the filter fades faster than the noise
+
+/// One of the two signals of a pixel, with the variance of the luminance of its mean.
+struct Signal {
+  Vec3 colour{0.0f};
+  float variance = 0.0f;
+};
+
+/// The guides of a pixel.
+struct Guide {
+  Vec3 normal{0.0f};
+  float z = 0.0f, slope = 0.0f; ///< depth, and its change per pixel
+  uint32_t instance = kNoInstance;
+};
+
+struct Grid {
+  ImageSize size;
+  size_t at(uint32_t x, uint32_t y) const { return size_t{y} * size.width + x; }
+  /// Calls work(x, y) for all pixels.
+  template <class Work>
+  void for_each(const Work& work) const {
+    tbb::parallel_for(tbb::blocked_range<uint32_t>(0, size.height, 8), [&](const tbb::blocked_range<uint32_t>& rows) {
+      for (uint32_t y = rows.begin(); y < rows.end(); ++y)
+        for (uint32_t x = 0; x < size.width; ++x) work(x, y);
+    });
+  }
+  /// Calls work(index, i, j) for the 3 x 3 pixels around one, `step` apart, that lie in the image; i and j are in
+  /// [-1, 1].
+  template <class Work>
+  void around(uint32_t x, uint32_t y, uint32_t step, const Work& work) const {
+    for (int j = -1; j <= 1; ++j)
+      for (int i = -1; i <= 1; ++i) {
+        const int64_t u = int64_t{x} + i * int64_t{step}, v = int64_t{y} + j * int64_t{step};
+        if (u < 0 || v < 0 || u >= size.width || v >= size.height) continue;
+        work(at(static_cast<uint32_t>(u), static_cast<uint32_t>(v)), i, j);
+      }
+  }
+};
+
+/// How far two pixels show the same surface, [0, 1].
+float surface_weight(const Guide& a, const Guide& b, float distance_px) {
+  if (a.instance != b.instance) return 0.0f;
+  const float cosine = std::max(glm::dot(a.normal, b.normal), 0.0f);
+  const float c2 = cosine * cosine, c4 = c2 * c2, c8 = c4 * c4, c32 = c8 * c8 * c8 * c8;
+  const float tolerance = 2.0f * a.slope * distance_px + 1e-3f * a.z;
+  const float depth = std::abs(a.z - b.z) / tolerance;
+  return depth < 4.0f ? c32 * std::exp(-depth) : 0.0f;
+}
+
+std::vector<Guide> guides_of(const ShadedGuides& g, const Grid& grid) {
+  std::vector<Guide> guides(g.size.pixels());
+  grid.for_each([&](uint32_t x, uint32_t y) {
+    const size_t i = grid.at(x, y);
+    Guide& guide = guides[i];
+    guide.normal = g.normal[i], guide.z = g.view_z[i], guide.instance = g.instance[i];
+    // The smaller of the changes to both sides: the larger may cross an edge.
+    const auto change = [&](bool before, size_t previous, bool after, size_t next) {
+      const float a = before ? std::abs(g.view_z[previous] - guide.z) : INFINITY;
+      const float b = after ? std::abs(g.view_z[next] - guide.z) : INFINITY;
+      const float least = std::min(a, b);
+      return std::isfinite(least) ? least : 0.0f;
+    };
+    guide.slope = std::max(change(x > 0, i - 1, x + 1 < g.size.width, i + 1),
+                           change(y > 0, i - g.size.width, y + 1 < g.size.height, i + g.size.width));
+  });
+  return guides;
+}
+
+/// Variances of the means of short histories: that of their neighbours' colours.
+void estimate_short_histories(const Grid& grid, std::span<const Guide> guides, std::span<const float> frames,
+                              std::vector<Signal>& signals) {
+  std::vector<float> variances(signals.size());
+  grid.for_each([&](uint32_t x, uint32_t y) {
+    const size_t p = grid.at(x, y);
+    variances[p] = signals[p].variance;
+    if (frames[p] >= kLongHistory) return;
+    float sum = 0.0f, squares = 0.0f, weights = 0.0f;
+    for (const uint32_t step : {1u, 2u})
+      grid.around(x, y, step, [&](size_t q, int i, int j) {
+        const float distance = static_cast<float>(step) * std::hypot(static_cast<float>(i), static_cast<float>(j));
+        const float weight = surface_weight(guides[p], guides[q], distance);
+        const float light = luminance(signals[q].colour);
+        sum += weight * light, squares += weight * light * light, weights += weight;
+      });
+    if (!(weights > 0.0f)) return;
+    const float mean = sum / weights;
+    variances[p] = std::max(variances[p], std::max(0.0f, squares / weights - mean * mean));
+  });
+  for (size_t i = 0; i < signals.size(); ++i) signals[i].variance = variances[i];
+}
+
+/// The variance of a pixel, smoothed: it is noisy itself.
+float smooth_variance(const Grid& grid, std::span<const Signal> in, uint32_t x, uint32_t y) {
+  float sum = 0.0f, weights = 0.0f;
+  grid.around(x, y, 1, [&](size_t q, int i, int j) {
+    const float weight = (i == 0 ? 2.0f : 1.0f) * (j == 0 ? 2.0f : 1.0f);
+    sum += weight * in[q].variance, weights += weight;
+  });
+  return sum / weights;
+}
+
+void filter_pass(const Grid& grid, std::span<const Guide> guides, uint32_t step, std::span<const Signal> in,
+                 std::span<Signal> out) {
+  grid.for_each([&](uint32_t x, uint32_t y) {
+    const size_t p = grid.at(x, y);
+    out[p] = in[p];
+    if (guides[p].instance == kNoInstance) return;
+    const float variance = smooth_variance(grid, in, x, y), light = luminance(in[p].colour);
+    if (!(variance > 1e-8f * light * light)) return; // there is no noise to remove
+    const float scale = 1.0f / (kLuminances * std::sqrt(variance));
+    Vec3 sum(0.0f);
+    float variances = 0.0f, weights = 0.0f;
+    grid.around(x, y, step, [&](size_t q, int i, int j) {
+      float weight = (i == 0 ? 2.0f : 1.0f) * (j == 0 ? 2.0f : 1.0f);
+      if (q != p) {
+        const float distance = static_cast<float>(step) * (i != 0 && j != 0 ? 1.4142f : 1.0f);
+        weight *= surface_weight(guides[p], guides[q], distance);
+        if (weight < 1e-4f) return;
+        weight *= std::exp(-std::abs(luminance(in[q].colour) - light) * scale);
+      }
+      sum += weight * in[q].colour, variances += weight * weight * in[q].variance, weights += weight;
+    });
+    out[p] = {sum / weights, variances / (weights * weights)};
+  });
+}
+
+/// Filters a signal; the second vector is memory.
+void filter_signal(const Grid& grid, std::span<const Guide> guides, std::span<const float> frames,
+                   std::vector<Signal>& signals, std::vector<Signal>& other) {
+  estimate_short_histories(grid, guides, frames, signals);
+  other.resize(signals.size());
+  for (int pass = 0; pass < kPasses; ++pass) {
+    filter_pass(grid, guides, 1u << pass, signals, other);
+    std::swap(signals, other);
+  }
+}
+
+/// Variance of the mean of a history; less for long ones, whose noise is smaller than what the filter would blur.
+float variance_of_mean(Vec3 mean, float square, float frames) {
+  const float light = luminance(mean), fade = std::min(1.0f, kFading / frames);
+  return fade * fade * std::max(0.0f, square - light * light) / std::max(frames - 1.0f, 1.0f);
+}
+
+} // namespace
+
+std::vector<ShadedPixel> filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& g) {
+  const Grid grid{g.size};
+  const std::vector<Guide> guides = guides_of(g, grid);
+  std::vector<ShadedPixel> result(pixels.begin(), pixels.end());
+  std::vector<Signal> signals(pixels.size()), other;
+  std::vector<float> frames(pixels.size());
+  const auto base = [&](size_t i) { return glm::max(g.albedo[i], Vec3(kDark)); };
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    const ShadedPixel& p = pixels[i];
+    const float scale = 1.0f / luminance(base(i));
+    signals[i] = {p.direct / base(i), variance_of_mean(p.direct, p.direct_square, p.direct_frames) * scale * scale};
+    frames[i] = p.direct_frames;
+  }
+  filter_signal(grid, guides, frames, signals, other);
+  for (size_t i = 0; i < pixels.size(); ++i)
+    if (guides[i].instance != kNoInstance) result[i].direct = signals[i].colour * base(i);
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    const ShadedPixel& p = pixels[i];
+    signals[i] = {p.specular, variance_of_mean(p.specular, p.specular_square, p.specular_frames)};
+    frames[i] = p.specular_frames;
+  }
+  filter_signal(grid, guides, frames, signals, other);
+  for (size_t i = 0; i < pixels.size(); ++i)
+    if (guides[i].instance != kNoInstance) result[i].specular = signals[i].colour;
+  return result;
+}
+
+} // namespace packtrace
