@@ -148,7 +148,8 @@ void replace_sparse(Document& document, const Value& sparse, const Layout& layou
 template <class Out>
 std::vector<Out> read_values(Document& document, const Value& accessor, const Layout& layout) {
   const uint64_t size = layout.count * layout.components();
-  document.memory().resize(document.memory().bytes() + size * sizeof(Out), "an accessor of the glTF document");
+  MemoryReservation& memory = document.values_memory();
+  memory.resize(memory.bytes() + size * sizeof(Out), "an accessor of the glTF document");
   std::vector<Out> values(static_cast<size_t>(size), Out{});
   if (accessor.has("bufferView")) {
     const Value view = document.element("bufferViews", accessor.at("bufferView").integer());
@@ -160,7 +161,6 @@ std::vector<Out> read_values(Document& document, const Value& accessor, const La
                   values.data());
   }
   if (const std::optional<Value> sparse = accessor.find("sparse")) replace_sparse(document, *sparse, layout, values);
-  document.memory().resize(document.memory().bytes() - size * sizeof(Out), "an accessor"); // counted by its receiver
   return values;
 }
 

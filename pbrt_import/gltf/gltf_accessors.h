@@ -15,8 +15,8 @@ struct AccessorValues {
 };
 
 /// Reads an accessor of any component type as floats: normalized integers are scaled to [0, 1] or [-1, 1], sparse
-/// values replaced. Throws Error(kInput) if it does not lie within its buffer; MemoryError. Source: glTF 2.0
-/// specification, section 3.6.2.
+/// values replaced. They are counted as memory while a ValuesInUse lives. Throws Error(kInput) if it does not lie
+/// within its buffer; MemoryError. Source: glTF 2.0 specification, section 3.6.2.
 AccessorValues read_floats(Document& document, uint64_t accessor);
 
 /// Reads an accessor of unsigned integers, of one component. Throws like read_floats().

@@ -78,7 +78,7 @@ std::string decode_percent(std::string_view text) {
 
 Document::Document(const std::filesystem::path& file, uint32_t file_number, const MeshFileContext& context)
     : context_(context), folder_(std::filesystem::absolute(file).parent_path()), file_number_(file_number),
-      content_(read_padded(file, context)), memory_(context.options.memory) {
+      content_(read_padded(file, context)), memory_(context.options.memory), values_memory_(context.options.memory) {
   json_text_ = content_.text;
   if (json_text_.starts_with("glTF")) split_binary();
   parse(json_text_);

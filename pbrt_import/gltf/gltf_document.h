@@ -45,6 +45,8 @@ public:
   const MeshFileContext& context() const { return context_; }
   /// Grows with all memory that is kept of the document.
   MemoryReservation& memory() { return memory_; }
+  /// Counts the values of accessors that are in use; see ValuesInUse.
+  MemoryReservation& values_memory() { return values_memory_; }
 
 private:
   void parse(std::string_view text);
@@ -64,7 +66,21 @@ private:
   nlohmann::json json_;
   std::map<uint64_t, std::span<const std::byte>> buffers_, views_, images_; ///< read so far; buffers to their ends
   std::vector<std::unique_ptr<std::vector<std::byte>>> kept_;
-  MemoryReservation memory_;
+  MemoryReservation memory_, values_memory_;
+};
+
+/// Until it ends, the values that accessors give are counted as memory; an accessor without a buffer view claims any
+/// amount of it.
+class ValuesInUse {
+public:
+  explicit ValuesInUse(Document& document) : memory_(document.values_memory()), before_(memory_.bytes()) {}
+  ~ValuesInUse() { memory_.resize(before_, {}); } // never grows, so it does not throw
+  ValuesInUse(const ValuesInUse&) = delete;
+  ValuesInUse& operator=(const ValuesInUse&) = delete;
+
+private:
+  MemoryReservation& memory_;
+  uint64_t before_;
 };
 
 } // namespace packtrace::gltf

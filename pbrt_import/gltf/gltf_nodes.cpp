@@ -69,6 +69,7 @@ void read_channel(Document& document, const Value& animation, const Value& chann
   const std::string interpolation = sampler.text_or("interpolation", "LINEAR");
   if (interpolation != "LINEAR" && interpolation != "STEP" && interpolation != "CUBICSPLINE")
     sampler.fail("has an unknown interpolation");
+  const ValuesInUse in_use(document);
   const AccessorValues times = read_floats(document, sampler.at("input").integer());
   const AccessorValues values = read_floats(document, sampler.at("output").integer());
   const uint64_t keys = times.count * (interpolation == "CUBICSPLINE" ? 3 : 1);
@@ -177,6 +178,7 @@ std::vector<PlacedNode> place_nodes(Document& document, double time) {
 std::vector<DAffine> instances_of(Document& document, const Value& node) {
   const std::optional<Value> extension = node.extension("EXT_mesh_gpu_instancing");
   if (!extension) return {DAffine(1.0)};
+  const ValuesInUse in_use(document);
   const Value attributes = extension->at("attributes");
   constexpr std::array<const char*, 3> kNames = {"TRANSLATION", "ROTATION", "SCALE"};
   std::array<AccessorValues, 3> values;

@@ -29,6 +29,7 @@ std::vector<DAffine> Skins::read(uint64_t number) const {
   }
   const std::optional<uint64_t> accessor = skin.find_integer("inverseBindMatrices");
   if (!accessor) return maps;
+  const ValuesInUse values(document_);
   const AccessorValues bind = read_floats(document_, *accessor);
   constexpr uint32_t kMatrix = 16;
   if (bind.components != kMatrix || bind.count < maps.size()) skin.fail("has fewer inverse bind matrices than joints");

@@ -170,6 +170,7 @@ std::optional<std::vector<int32_t>> lattice_of(Document& document, const Value& 
 
 void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh_value, const Value& primitive,
                         const Pose& pose) {
+  const ValuesInUse values(document);
   DirectiveFeed& feed = document.context().feed;
   const uint64_t mode = primitive.find_integer("mode").value_or(4);
   if (mode < 4) return feed.reporter().warning(document.place(), "points and lines have no surface; they are left out");

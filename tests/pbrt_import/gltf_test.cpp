@@ -413,6 +413,22 @@ TEST(GltfProblems, MemoryIsLimited) {
   EXPECT_THROW(import_file(folder.write("a.gltf", with_primitive(primitive, gltf).text()), options), MemoryError);
 }
 
+/// Values are counted until their primitive is made, together with the copies that it takes.
+TEST(GltfProblems, MemoryOfAccessorsWithoutViewsIsCounted) {
+  const SceneFolder folder;
+  GltfBuilder gltf;
+  constexpr int kVertices = 300'000; // 3.4 MiB of positions and as much of normals
+  const auto zeros = [&] { return gltf.accessor({{"componentType", 5126}, {"type", "VEC3"}, {"count", kVertices}}); };
+  const Json primitive = {{"attributes", {{"POSITION", zeros()}, {"NORMAL", zeros()}}},
+                          {"indices", gltf.accessor<uint16_t>("SCALAR", 5123, {0, 1, 2})}};
+  const std::filesystem::path file = folder.write("a.gltf", with_primitive(primitive, gltf).text());
+  ImportOptions options;
+  options.memory = MemoryBudget(10u << 20);
+  EXPECT_THROW(import_file(file, options), MemoryError);
+  options.memory = MemoryBudget(64u << 20);
+  EXPECT_NO_THROW(import_file(file, options));
+}
+
 TEST(GltfProblems, EveryPrefixAndFlippedByteEndsWell) {
   const SceneFolder folder;
   GltfBuilder gltf;
