@@ -227,6 +227,7 @@ uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuf
   if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer); view && traces_view_occlusion(*view, config, plan))
     return trace_view_occlusion(*view, tracer.space(), gbuffer, config, ao_radius(config, source.world_bounds()), plan,
                                 ao, progress);
+  ao.on_gpu = nullptr;
   const AoTracer ao_tracer(source, tracer, gbuffer, config, plan, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
   tbb::enumerable_thread_specific<TileMemory> memory;

@@ -1,6 +1,7 @@
 #include "runtime/ao/view_occlusion.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include <tbb/enumerable_thread_specific.h>
@@ -86,9 +87,16 @@ uint64_t trace_view_occlusion(const ViewTracer& tracer, const UnitSpace& space, 
   for_each_tile(gbuffer.size, quiet,
                 [&](const Tile& tile) { tiles.fill(tile, sampler, space, config.offset_scale, memory.local(), ao); });
   const std::vector<OcclusionPoint> points = tiles.all();
-  std::vector<OcclusionSums> sums(points.size());
   progress.advance(gbuffer.size.pixels() - points.size());
-  tracer.trace_occlusion(points, samples_of(config, plan, radius, space), sums, progress);
+  const OcclusionSamples samples = samples_of(config, plan, radius, space);
+  if (ao.may_stay_on_gpu) {
+    ao.on_gpu = tracer.leave_occlusion(points, samples, {gbuffer.size.pixels(), double{radius}}, std::move(ao.on_gpu),
+                                       progress);
+    return points.size() * uint64_t{plan.count};
+  }
+  ao.on_gpu = nullptr;
+  std::vector<OcclusionSums> sums(points.size());
+  tracer.trace_occlusion(points, samples, sums, progress);
   const double per_sample = 1.0 / plan.count;
   for (size_t i = 0; i < points.size(); ++i) {
     ao.ao[points[i].pixel] = static_cast<float>(sums[i].visibility * per_sample);

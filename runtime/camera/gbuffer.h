@@ -2,12 +2,17 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "pbrt_import/scene/image_size.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
+
+namespace gpu {
+class DeviceAo;
+}
 
 inline constexpr uint32_t kNoInstance = ~0u;
 
@@ -61,6 +66,10 @@ struct AoFrame {
   /// Number of samples whose mean each value of `ao` is, the least of all pixels. [1..65536]
   /// 1 if camera rays are jittered within their pixels, because values then also differ by what the rays hit.
   uint32_t samples = 1;
+  /// A tracer that works on a GPU may leave the values there: then `on_gpu` has them, and `ao` and `hit_distance` have
+  /// no meaning until ViewTracer::read_occlusion() fills them in.
+  bool may_stay_on_gpu = false;
+  std::shared_ptr<gpu::DeviceAo> on_gpu;
   /// Longest history in frames, not negative, that a pixel may keep from the frames before, as history_limits() finds
   /// it where something moved. Empty: no limits.
   std::vector<float> max_history;

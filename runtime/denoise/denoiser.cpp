@@ -63,7 +63,7 @@ void AoDenoiser::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySou
   if (size_.pixels() > 0) pipeline_->add_frame(gbuffer, ao, source);
 }
 
-const DenoisedAo& AoDenoiser::denoise() { return pipeline_->denoise(); }
+const DenoisedAo& AoDenoiser::denoise(bool with_variance) { return pipeline_->denoise(with_variance); }
 
 std::vector<std::byte> AoDenoiser::save() const { return pipeline_->save(); }
 

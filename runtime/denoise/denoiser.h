@@ -42,8 +42,10 @@ public:
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source = HistorySource::kMotion);
 
   /// The second half of next_frame(): filters a copy of the history. Without a frame, all pixels are misses.
+  /// @param with_variance whether DenoisedAo::variance is wanted. Without, it is undefined, and a GPU keeps it to
+  /// itself.
   /// @return the result, valid until the next call
-  const DenoisedAo& denoise();
+  const DenoisedAo& denoise(bool with_variance = true);
 
   /// Returns the history and its guides as bytes, for restore(); empty without history.
   std::vector<std::byte> save() const;

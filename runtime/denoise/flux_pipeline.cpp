@@ -21,7 +21,7 @@ public:
 
   void resize(ImageSize size) override;
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) override;
-  const DenoisedAo& denoise() override;
+  const DenoisedAo& denoise(bool with_variance) override;
   std::vector<std::byte> save() const override;
   void restore(ImageSize size, std::span<const std::byte> bytes) override;
   void reset() override { has_frame_ = false; }
@@ -91,7 +91,7 @@ void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistoryS
       now_.history);
 }
 
-const DenoisedAo& FluxPipeline::denoise() {
+const DenoisedAo& FluxPipeline::denoise(bool) {
   if (!has_frame_) return result_;
   if (pair_guides_outdated_)
     pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()),

@@ -16,6 +16,7 @@
 #include "runtime/frame/surface_layers.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/trace/view_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -312,6 +313,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   report_.times.denoise_s += limiting.seconds();
   const Stopwatch tracing;
   const SamplePlan plan = sample_plan(shaded, limits);
+  raw_.may_stay_on_gpu = config_.denoise && !quarter && scene().backend.backend == Backend::kGpu;
   report_.ao_rays = trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, plan, raw_, progress);
   raw_.max_history = std::move(limits);
   if (config_.jitters()) raw_.samples = 1;
@@ -351,7 +353,7 @@ std::span<const float> FrameLoop::accumulated_ao(std::vector<float>& raw_mean, P
     const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
     return raw_mean = raw_mean_.result(raw_.size, quarter ? half_.gbuffer.instance : layers_.instances(gbuffer_));
   }
-  const DenoisedAo& denoised = denoiser_.denoise();
+  const DenoisedAo& denoised = denoiser_.denoise(config_.view_layers);
   denoised_ = &denoised;
   report.times.denoise_s += denoising.seconds();
   double sum = 0.0;
@@ -369,6 +371,13 @@ void FrameLoop::resolve_shading(std::span<const float> ao, RenderedImage& image)
   const GBuffer& mean = still_frames_ > 0 ? guides_ : gbuffer_;
   const ShadedGuides guides{mean.size, mean.view_z, mean.normal, mean.instance, layers_.albedos(gbuffer_)};
   packtrace::resolve_shading(config_, filter_shading(shaded_mean_.pixels(), guides), ao, image);
+}
+
+/// Reads samples that stayed on a GPU, if a layer shows them.
+void FrameLoop::read_samples() {
+  if (!raw_.on_gpu || (!config_.view_layers && (config_.plain_layers & kAoRawLayer) == 0)) return;
+  if (const auto* tracer = dynamic_cast<const ViewTracer*>(tracers().back()))
+    tracer->read_occlusion(*raw_.on_gpu, raw_.ao, raw_.hit_distance);
 }
 
 /// Writes the views of the last frame; motion is that since the last image.
@@ -400,6 +409,7 @@ void FrameLoop::show_layers(const FrameConfig& config) {
 
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   PassTimes& times = report.times;
+  read_samples();
   std::vector<float> raw_mean;
   const std::span<const float> ao = accumulated_ao(raw_mean, report);
   if (config_.ao_resolution == AoResolution::kQuarter) {

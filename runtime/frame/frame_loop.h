@@ -92,6 +92,7 @@ private:
   void shade_frame(bool changed, Progress& progress);
   void resolve_shading(std::span<const float> ao, RenderedImage& image);
   std::span<const float> accumulated_ao(std::vector<float>& raw_mean, PictureReport& report);
+  void read_samples();
   void resolve_views(RenderedImage& image);
   void resolve_surfaces(RenderedImage& image) const;
 

@@ -6,30 +6,13 @@
 #include <utility>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/gpu/device/buffer.h"
-#include "runtime/gpu/device/commands.h"
 #include "runtime/gpu/device/kernel.h"
+#include "runtime/gpu/device/staged_buffer.h"
+#include "runtime/gpu/device_ao.h"
 #include "runtime/gpu/shaders/spirv.h"
 
 namespace packtrace::gpu {
 namespace {
-
-/// A buffer on the device, and its mapped twin.
-struct Staged {
-  Buffer host, device;
-
-  void resize(const std::shared_ptr<Device>& owner, uint64_t bytes, const char* what) {
-    host = Buffer(), device = Buffer();
-    host = Buffer(owner, bytes, BufferPlace::kHost, what);
-    device = Buffer(owner, bytes, BufferPlace::kDevice, what);
-  }
-  template <typename T>
-  void upload(Commands& commands, std::span<const T> values) const {
-    if (values.empty()) return;
-    std::memcpy(host.data(), values.data(), values.size_bytes());
-    commands.copy(host, device, values.size_bytes());
-  }
-};
 
 /// What a frame leaves to the next one.
 struct Past {
@@ -69,7 +52,7 @@ constexpr const char* kPassNames[] = {"pass 1", "pass 2", "pass 3", "pass 4"};
 struct DeviceDenoiser::State {
   std::shared_ptr<Device> device;
   uint32_t width = 0, height = 0;
-  Staged view_z, normal, instance, motion, previous_z, limits, ao, result;
+  StagedBuffer view_z, normal, instance, motion, previous_z, limits, ao, result;
   std::array<Past, 2> past;
   uint32_t now = 0; ///< of `past`
   Buffer samples, pair_guides, changes;
@@ -79,6 +62,7 @@ struct DeviceDenoiser::State {
   Commands commands;
   std::vector<DenoiserDispatch> dispatches; ///< in `commands`
 
+  bool is_here(const DeviceAo* picture) const { return picture != nullptr && picture->device() == device; }
   uint64_t pixels() const { return uint64_t{width} * height; }
   void dispatch(const char* name, Kernel& kernel, const DenoiseRecord& terms, uint32_t tile_height, uint32_t bytes);
   std::vector<DenoiserDispatch> run();
@@ -112,10 +96,14 @@ void DeviceDenoiser::resize(uint32_t width, uint32_t height) {
   State& s = *state_;
   s.width = width, s.height = height, s.now = 0;
   const uint64_t n = s.pixels();
-  s.view_z.resize(s.device, 4 * n, "depths"), s.normal.resize(s.device, 12 * n, "normals");
-  s.instance.resize(s.device, 4 * n, "instances"), s.motion.resize(s.device, 8 * n, "motion");
-  s.previous_z.resize(s.device, 4 * n, "previous depths"), s.limits.resize(s.device, 4 * n, "limits of histories");
-  s.ao.resize(s.device, 4 * n, "samples"), s.result.resize(s.device, 3 * kResultBytes * n, "the denoiser's result");
+  const auto staged = [&](StagedBuffer& buffer, uint64_t bytes, const char* what) {
+    buffer = StagedBuffer();
+    buffer = StagedBuffer(s.device, bytes, what);
+  };
+  staged(s.view_z, 4 * n, "depths"), staged(s.normal, 12 * n, "normals"), staged(s.instance, 4 * n, "instances");
+  staged(s.motion, 8 * n, "motion"), staged(s.previous_z, 4 * n, "previous depths");
+  staged(s.limits, 4 * n, "limits of histories"), staged(s.ao, 4 * n, "samples");
+  staged(s.result, 3 * kResultBytes * n, "the denoiser's result");
   const auto on_device = [&](Buffer& buffer, uint64_t bytes, const char* what) {
     buffer = Buffer();
     buffer = Buffer(s.device, bytes, BufferPlace::kDevice, what);
@@ -150,12 +138,18 @@ std::vector<DenoiserDispatch> DeviceDenoiser::State::run() {
 /// Uploads what the history's kernel reads.
 void DeviceDenoiser::State::upload(const DenoiseRecord& terms, const DenoiserFrame& frame) {
   if ((terms.flags & kKeepGuides) == 0)
-    view_z.upload(commands, frame.view_z), normal.upload(commands, frame.normal),
-        instance.upload(commands, frame.instance);
+    view_z.write(commands, std::as_bytes(frame.view_z)), normal.write(commands, std::as_bytes(frame.normal)),
+        instance.write(commands, std::as_bytes(frame.instance));
   if ((terms.flags & kFollowMotion) != 0)
-    motion.upload(commands, frame.motion_px), previous_z.upload(commands, frame.previous_z);
-  limits.upload(commands, frame.max_history);
-  ao.upload(commands, frame.ao);
+    motion.write(commands, std::as_bytes(frame.motion_px)), previous_z.write(commands, std::as_bytes(frame.previous_z));
+  limits.write(commands, std::as_bytes(frame.max_history));
+  if (frame.ao_on_device == nullptr) {
+    ao.write(commands, std::as_bytes(frame.ao));
+  } else if (!is_here(frame.ao_on_device)) {
+    std::vector<float> values(frame.ao_on_device->pixels()), distances(values.size());
+    frame.ao_on_device->read(values, distances);
+    ao.write(commands, std::as_bytes(std::span(values)));
+  }
 }
 
 /// Writes two words: whether something moved in this frame, and whether a guide changed since the pair guides were
@@ -165,7 +159,8 @@ void DeviceDenoiser::State::find_changes(const DenoiseRecord& terms) {
   commands.fill(changes, 0, 1, first ? 1 : 0);
   if (first || (!follows && (terms.flags & kKeepGuides) == 0)) commands.fill(changes, 1, 1, 1);
   if (first || !follows) return;
-  bind(*compare, {&view_z.device, &normal.device, &instance.device, &motion.device, &past[now ^ 1].guides, &changes});
+  bind(*compare,
+       {&view_z.device(), &normal.device(), &instance.device(), &motion.device(), &past[now ^ 1].guides, &changes});
   dispatch("compare", *compare, terms, kGroupHeight, 0);
 }
 
@@ -176,9 +171,11 @@ std::vector<DenoiserDispatch> DeviceDenoiser::add(const DenoiseRecord& terms, co
   const Past &before = s.past[follows ? s.now ^ 1 : s.now], &now = s.past[s.now];
   s.upload(terms, frame);
   s.find_changes(terms);
-  s.bind(*s.history, {&s.view_z.device, &s.normal.device, &s.instance.device, &s.motion.device, &s.previous_z.device,
-                      &s.limits.device, &s.ao.device, &s.changes, &before.guides, &now.guides, &before.history,
-                      &now.history, &before.trend, &now.trend, &s.samples});
+  s.bind(*s.history,
+         {&s.view_z.device(), &s.normal.device(), &s.instance.device(), &s.motion.device(), &s.previous_z.device(),
+          &s.limits.device(), s.is_here(frame.ao_on_device) ? &frame.ao_on_device->values() : &s.ao.device(),
+          &s.changes, &before.guides, &now.guides, &before.history, &now.history, &before.trend, &now.trend,
+          &s.samples});
   s.dispatch("history", *s.history, terms, kGroupHeight, history_bytes(terms.flags));
   if ((terms.flags & (kFollowMotion | kKeepGuides)) != 0) { // histories of jittered pixels are plain means
     s.bind(*s.correct, {&s.samples, &now.history, &now.trend});
@@ -194,16 +191,17 @@ std::vector<DenoiserDispatch> DeviceDenoiser::filter(const DenoiseRecord& terms,
   s.dispatch("guides", *s.guides, terms, kTileHeight, kGuideBytes + kPairBytes);
   s.commands.fill(s.changes, 1, 1, 0);
   s.bind(*s.variance,
-         {&now.history, &now.trend, &now.guides, &s.pair_guides, &s.changes, &s.noisy[0], &s.result.device});
+         {&now.history, &now.trend, &now.guides, &s.pair_guides, &s.changes, &s.noisy[0], &s.result.device()});
   s.dispatch("variance", *s.variance, terms, kGroupHeight,
-             kHistoryBytes + kTrendBytes + kGuideBytes + kNoisyBytes + kResultBytes);
+             kHistoryBytes + kTrendBytes + kNoisyBytes + kResultBytes +
+                 ((terms.flags & kFollowMotion) != 0 ? 0 : kGuideBytes));
   if (s.finish) {
-    s.bind(*s.finish, {&s.noisy[0], &now.history, &s.result.device});
+    s.bind(*s.finish, {&s.noisy[0], &now.history, &s.result.device()});
     s.dispatch("finish", *s.finish, terms, kGroupHeight, kNoisyBytes + kHistoryBytes / 2 + 2 * kResultBytes);
   }
   for (size_t i = 0; i < s.filter_passes.size(); ++i) {
     Kernel& pass = *s.filter_passes[i];
-    s.bind(pass, {&s.noisy[i % 2], &s.noisy[(i + 1) % 2], &s.pair_guides, &now.history, &s.result.device});
+    s.bind(pass, {&s.noisy[i % 2], &s.noisy[(i + 1) % 2], &s.pair_guides, &now.history, &s.result.device()});
     DenoiseRecord of_pass = terms;
     const bool last = i + 1 == s.filter_passes.size();
     if (last) of_pass.flags |= kLastPass;
@@ -214,10 +212,11 @@ std::vector<DenoiserDispatch> DeviceDenoiser::filter(const DenoiseRecord& terms,
   const std::span<float> planes[] = {result.ao, result.variance, result.tspp};
   for (size_t i = 0; i < std::size(planes); ++i)
     if (!planes[i].empty())
-      s.commands.copy(s.result.device, s.result.host, i * planes[i].size_bytes(), planes[i].size_bytes());
+      s.commands.copy(s.result.device(), s.result.host(), i * planes[i].size_bytes(), planes[i].size_bytes());
   std::vector<DenoiserDispatch> times = s.run();
   for (size_t i = 0; i < std::size(planes); ++i)
-    std::copy_n(s.result.host.as<float>() + i * planes[i].size(), planes[i].size(), planes[i].begin());
+    copy_in_parts(reinterpret_cast<std::byte*>(planes[i].data()), s.result.host().data() + i * planes[i].size_bytes(),
+                  planes[i].size_bytes());
   return times;
 }
 

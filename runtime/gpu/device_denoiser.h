@@ -11,6 +11,8 @@
 
 namespace packtrace::gpu {
 
+class DeviceAo;
+
 /// The channels of a frame that the denoiser reads, one entry per pixel, rows top to bottom: GBuffer and AoFrame.
 struct DenoiserFrame {
   std::span<const float> view_z;
@@ -20,6 +22,7 @@ struct DenoiserFrame {
   std::span<const float> previous_z;  ///< may be empty
   std::span<const float> max_history; ///< may be empty
   std::span<const float> ao;
+  const DeviceAo* ao_on_device = nullptr; ///< in place of `ao`
 };
 
 /// Where the result goes, one entry per pixel. What is empty is not read back.

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/gpu/device/staged_buffer.h"
+#include "runtime/gpu/device_ao.h"
 #include "runtime/gpu/gpu_scene_state.h"
 #include "runtime/gpu/shaders/spirv.h"
 
@@ -91,9 +93,11 @@ struct DeviceRays::State {
   GpuScene::State& scene;
   std::shared_ptr<Device> device;
   CameraRecord camera{};
-  Buffer cameras, hits, rays, points, counts, sums;
+  Buffer cameras, hits, rays, counts, sums;
+  StagedBuffer points;
   uint32_t point_count = 0;
   std::unique_ptr<Kernel> camera_kernel, points_kernel, rays_kernel, queue_kernel, nearest_kernel;
+  std::unique_ptr<Kernel> picture_kernel;
   uint64_t placed = 0;                                          ///< GpuScene::State::placed of the kernels
   std::vector<uint32_t> constants;                              ///< GpuScene::State::constants of the kernels
   Pace camera_pace, queue_pace[kOrders], nearest_pace[kOrders]; ///< of occlusion rays by the order of samples
@@ -102,6 +106,12 @@ struct DeviceRays::State {
     if (buffer.bytes() >= bytes) return;
     buffer = Buffer();
     buffer = Buffer(device, bytes, BufferPlace::kDevice, what);
+  }
+  void make_room_for_points() {
+    const uint64_t bytes = uint64_t{point_count} * sizeof(PointRecord);
+    if (points.bytes() >= bytes && points.bytes() > 0) return;
+    points = StagedBuffer();
+    points = StagedBuffer(device, bytes, "points");
   }
   uint64_t most_threads() const { return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * kThreads; }
   void make_queue_kernel();
@@ -148,10 +158,10 @@ void DeviceRays::make_points(float lift) {
   State& s = *state_;
   s.follow_scene();
   s.point_count = blocks_of(s.camera) * 32;
-  s.make_room(s.points, uint64_t{s.point_count} * sizeof(PointRecord), "points");
+  s.make_room_for_points();
   if (!s.points_kernel)
     s.points_kernel = s.scene.make_kernel(spirv::surface_points(), kFirstBinding + 4, sizeof(SpanRecord));
-  const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays, &s.points};
+  const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays, &s.points.device()};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.points_kernel->bind(kFirstBinding + i, *buffers[i]);
   for (uint64_t first = 0; first < s.point_count; first += s.most_threads()) {
     const uint64_t count = std::min(s.point_count - first, s.most_threads());
@@ -165,13 +175,13 @@ void DeviceRays::set_points(std::span<const PointRecord> points) {
   if (points.size() > kMaxPoints)
     throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 points at once; use a smaller picture");
   s.point_count = static_cast<uint32_t>(points.size());
-  s.make_room(s.points, points.size_bytes(), "points");
-  update(s.device, s.points, 0, std::as_bytes(points));
+  s.make_room_for_points();
+  Commands commands;
+  s.points.write(commands, std::as_bytes(points));
+  s.device->run(commands);
 }
 
-void DeviceRays::release() {
-  for (Buffer* buffer : {&state_->points, &state_->counts, &state_->sums}) *buffer = Buffer();
-}
+void DeviceRays::release() { state_->points = StagedBuffer(), state_->counts = Buffer(), state_->sums = Buffer(); }
 
 bool DeviceRays::can_count() const {
   const uint32_t lanes = state_->device->traits().subgroup_size;
@@ -219,7 +229,7 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watc
   s.make_room(s.counts, (uint64_t{s.point_count} + 1) * sizeof(uint32_t), "counts");
   s.device->fill(s.counts, 0);
   if (!s.queue_kernel) s.make_queue_kernel();
-  s.queue_kernel->bind(kFirstBinding, s.points);
+  s.queue_kernel->bind(kFirstBinding, s.points.device());
   s.queue_kernel->bind(kFirstBinding + 1, s.counts);
   const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };
   const DeviceTime time = s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_pace[samples.order], threads, watch);
@@ -238,11 +248,41 @@ DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& 
   s.device->fill(s.sums, 0);
   if (!s.nearest_kernel)
     s.nearest_kernel = s.scene.make_kernel(spirv::occlusion_nearest(), kFirstBinding + 2, sizeof(OcclusionRecord));
-  s.nearest_kernel->bind(kFirstBinding, s.points);
+  s.nearest_kernel->bind(kFirstBinding, s.points.device());
   s.nearest_kernel->bind(kFirstBinding + 1, s.sums);
   return s.run_all(
       *s.nearest_kernel, samples, kMaxNearestSamples, s.nearest_pace[samples.order], [](uint32_t) { return 1u; },
       watch);
+}
+
+std::shared_ptr<DeviceAo> DeviceRays::empty_picture(size_t pixels, std::shared_ptr<DeviceAo> reused) const {
+  const std::shared_ptr<Device>& device = state_->device;
+  if (!reused || reused->pixels() != pixels || reused->device() != device)
+    reused = std::make_shared<DeviceAo>(device, pixels);
+  Commands commands;
+  commands.fill(reused->values(), 0, pixels, std::bit_cast<uint32_t>(-1.0f)); // kInvalidAo
+  commands.fill(reused->values(), pixels, pixels, 0);
+  device->run(commands);
+  return reused;
+}
+
+void DeviceRays::write_picture(DeviceAo& picture, uint32_t sample_count, bool nearest, double radius) {
+  State& s = *state_;
+  if (s.point_count == 0) return;
+  if (!s.picture_kernel)
+    s.picture_kernel = std::make_unique<Kernel>(s.device, spirv::occlusion_image(), std::span<const uint32_t>(), 4,
+                                                static_cast<uint32_t>(sizeof(OcclusionImageRecord)));
+  const Buffer &counts = nearest ? s.sums : s.counts, &sums = nearest ? s.sums : s.counts; // one of them is read
+  const Buffer* const buffers[] = {&s.points.device(), &counts, &sums, &picture.values()};
+  for (uint32_t i = 0; i < std::size(buffers); ++i) s.picture_kernel->bind(i, *buffers[i]);
+  const OcclusionImageRecord record{
+      1.0 / sample_count, radius, s.point_count, sample_count, static_cast<uint32_t>(picture.pixels()),
+      nearest ? 1u : 0u};
+  s.device->run(*s.picture_kernel, push_bytes(record), groups_of(s.point_count));
+}
+
+void DeviceRays::read_picture(const DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const {
+  picture.read(ao, hit_distance);
 }
 
 uint32_t DeviceRays::point_count() const { return state_->point_count; }
@@ -254,7 +294,7 @@ void DeviceRays::rays(std::span<packed::KernelRay> out) const {
   download(state_->device, state_->rays, 0, std::as_writable_bytes(out));
 }
 void DeviceRays::points(std::span<PointRecord> out) const {
-  download(state_->device, state_->points, 0, std::as_writable_bytes(out));
+  download(state_->device, state_->points.device(), 0, std::as_writable_bytes(out));
 }
 void DeviceRays::counts(std::span<uint32_t> out) const {
   download(state_->device, state_->counts, 0, std::as_writable_bytes(out));
@@ -270,8 +310,8 @@ void DeviceRays::occlusion_rays(const OcclusionRecord& samples, std::span<packed
   Buffer rays(s.device, uint64_t{s.point_count} * sizeof(packed::KernelRay), BufferPlace::kDevice, "occlusion rays");
   if (!s.rays_kernel)
     s.rays_kernel = s.scene.make_kernel(spirv::occlusion_rays(), kFirstBinding + 3, sizeof(OcclusionRecord));
-  s.rays_kernel->bind(kFirstBinding, s.points);
-  s.rays_kernel->bind(kFirstBinding + 1, s.points); // not used
+  s.rays_kernel->bind(kFirstBinding, s.points.device());
+  s.rays_kernel->bind(kFirstBinding + 1, s.points.device()); // not used
   s.rays_kernel->bind(kFirstBinding + 2, rays);
   OcclusionRecord all = samples;
   for (uint64_t first = 0; first < s.point_count; first += s.most_threads()) {

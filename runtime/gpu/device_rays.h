@@ -9,6 +9,8 @@
 
 namespace packtrace::gpu {
 
+class DeviceAo;
+
 /// Device time of some dispatches, in ms.
 struct DeviceTime {
   double ms = 0.0;
@@ -41,6 +43,16 @@ public:
   DeviceTime count_occluded(const OcclusionRecord& samples, const Watch& watch = {});
   /// Sums visibility and distance of the nearest hits of each point's rays up, in the order of the samples.
   DeviceTime sum_nearest(const OcclusionRecord& samples, const Watch& watch = {});
+
+  /// A picture without any value: AO of -1.
+  std::shared_ptr<DeviceAo> empty_picture(size_t pixels, std::shared_ptr<DeviceAo> reused) const;
+  /// Writes the results of count_occluded() or sum_nearest() to the points' pixels.
+  /// @param nearest results of sum_nearest()
+  /// @param radius of occlusion, in the units of hit distances
+  void write_picture(DeviceAo& picture, uint32_t sample_count, bool nearest, double radius);
+
+  /// Reads a picture, one entry per pixel.
+  void read_picture(const DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const;
 
   /// Frees the memory of points and of their results.
   void release();

@@ -55,21 +55,47 @@ void GpuScene::State::upload_all(const SceneTables& t) {
   upload_placements(t);
 }
 
-/// Uploads placements and what depends on them. The old buffers stay if there is no room for all new ones.
+/// Makes larger buffers for placements and what depends on them, if they need them. The old ones stay if there is no
+/// room for all new ones. Returns whether some were replaced.
+bool GpuScene::State::replace_buffers(const SceneTables& t) {
+  const uint64_t placement_bytes = (t.placements.size() + 1) * sizeof(packed::TracePlacement);
+  if (scene.bytes() != 0 && placement_bytes <= placements.bytes() && t.top_nodes.size_bytes() <= top_nodes.bytes() &&
+      t.masks.size_bytes() <= masks.bytes())
+    return false;
+  StagedBuffer new_placements(device, placement_bytes, "placements"),
+      new_top_nodes(device, t.top_nodes.size_bytes(), "the tree over placements"),
+      new_scene(device, sizeof(SceneRecord), "the scene's record");
+  if (masks.bytes() == 0 || t.masks.size_bytes() > masks.bytes()) {
+    masks = upload_span(device, t.masks, "masks");
+    placed_materials.clear();
+  }
+  placements = std::move(new_placements), top_nodes = std::move(new_top_nodes), scene = std::move(new_scene);
+  return true;
+}
+
+/// The placements' materials are the last words of the masks; there are as many as placements that are not flat.
+void GpuScene::State::upload_materials(const SceneTables& t) {
+  if (t.masks.empty()) return;
+  const std::span<const std::byte> words = std::as_bytes(t.masks.subspan(t.scene.material_word));
+  if (std::ranges::equal(words, placed_materials)) return;
+  update(device, masks, sizeof(uint32_t) * uint64_t{t.scene.material_word}, words);
+  placed_materials.assign(words.begin(), words.end());
+  uploaded_bytes += words.size();
+}
+
+/// Uploads the placements that changed and what depends on them.
 void GpuScene::State::upload_placements(const SceneTables& t) {
+  const bool replaced = replace_buffers(t);
+  uploaded_bytes = 0;
   std::vector<packed::TracePlacement> all(t.placements.begin(), t.placements.end());
   all.push_back(t.top);
-  Buffer new_placements = upload_span(device, std::span<const packed::TracePlacement>(all), "placements");
-  Buffer new_top_nodes = upload_span(device, t.top_nodes, "the tree over placements");
-  Buffer new_scene = upload_span(device, std::span<const SceneRecord>(&t.scene, 1), "the scene's record");
-  // The placements' materials are the last words of the masks; there are as many as placements that are not flat.
-  const std::span<const std::byte> words = std::as_bytes(t.masks);
-  if (masks.bytes() == 0 || words.size() > masks.bytes())
-    masks = upload_span(device, t.masks, "masks");
-  else if (!words.empty())
-    update(device, masks, sizeof(uint32_t) * uint64_t{t.scene.material_word},
-           words.subspan(sizeof(uint32_t) * size_t{t.scene.material_word}));
-  placements = std::move(new_placements), top_nodes = std::move(new_top_nodes), scene = std::move(new_scene);
+  Commands commands;
+  uploaded_bytes += placements.write_changes(commands, std::as_bytes(std::span(all)), sizeof all[0]);
+  uploaded_bytes += top_nodes.write_changes(commands, std::as_bytes(t.top_nodes), sizeof(packed::TopNode));
+  uploaded_bytes += scene.write_changes(commands, std::as_bytes(std::span(&t.scene, 1)), sizeof t.scene);
+  if (uploaded_bytes > 0) device->run(commands);
+  upload_materials(t);
+  if (!replaced) return;
   for (Kernel* kernel : {closest.get(), any.get()})
     if (kernel != nullptr) bind_scene(*kernel);
   ++placed;
@@ -199,6 +225,8 @@ void GpuScene::release_rays() const {
   const std::lock_guard lock(state_->mutex);
   state_->rays = Buffer(), state_->results = Buffer();
 }
+
+uint64_t GpuScene::uploaded_bytes() const { return state_->uploaded_bytes; }
 
 std::string GpuScene::device_name() const { return state_->device->name(); }
 uint32_t GpuScene::subgroup_size() const { return state_->device->traits().subgroup_size; }

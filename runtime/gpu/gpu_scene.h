@@ -37,8 +37,11 @@ public:
   GpuScene(const GpuConfig& config, const SceneTables& tables);
   ~GpuScene();
 
-  /// Uploads placements and the tree over them again.
+  /// Uploads the placements that changed, and the nodes of the tree over them that did.
   void replace_placements(const SceneTables& tables);
+
+  /// Bytes that the last upload of placements took.
+  uint64_t uploaded_bytes() const;
 
   /// Finds nearest hits; see RayTracer::closest_hits().
   /// @param between called before each dispatch; may throw

@@ -9,6 +9,7 @@
 
 #include "runtime/gpu/device/buffer.h"
 #include "runtime/gpu/device/kernel.h"
+#include "runtime/gpu/device/staged_buffer.h"
 #include "runtime/gpu/gpu_scene.h"
 
 namespace packtrace::gpu {
@@ -19,13 +20,16 @@ inline constexpr uint32_t kSceneBindings = 9; ///< buffers of a scene, bound to 
 struct GpuScene::State {
   std::shared_ptr<Device> device;
   bool exact = false;
-  Buffer nodes, clusters, payload, placements, top_nodes, trees, exact_vertices, masks, scene;
+  Buffer nodes, clusters, payload, trees, exact_vertices, masks;
+  StagedBuffer placements, top_nodes, scene;
+  std::vector<std::byte> placed_materials; ///< the words of `masks` that belong to placements
   std::unique_ptr<Kernel> closest, any;
   std::vector<uint32_t> constants; ///< of all kernels: scene.glsl
   uint32_t top_levels = 0;         ///< that the kernels have room for
   bool many_placements = false;    ///< whether the kernels traverse a tree over placements
   size_t node_count = 0;
-  uint64_t placed = 0; ///< times that placements were uploaded
+  uint64_t placed = 0;         ///< times that buffers of placements were replaced
+  uint64_t uploaded_bytes = 0; ///< of placements and what depends on them, by the last replacement
   // Of the queries, under the mutex:
   std::mutex mutex;
   Buffer rays, results;
@@ -34,13 +38,16 @@ struct GpuScene::State {
 
   void upload_all(const SceneTables& t);
   void upload_placements(const SceneTables& t);
+  bool replace_buffers(const SceneTables& t);
+  void upload_materials(const SceneTables& t);
   void make_kernels(const SceneTables& t);
   void prepare_nodes(size_t count);
   /// A kernel that reads the scene, with its buffers bound.
   std::unique_ptr<Kernel> make_kernel(std::span<const uint32_t> spirv, uint32_t bindings, size_t push_bytes) const;
   void bind_scene(Kernel& kernel) const;
   std::array<const Buffer*, kSceneBindings> scene_buffers() const {
-    return {&nodes, &clusters, &payload, &placements, &top_nodes, &trees, &exact_vertices, &masks, &scene};
+    return {&nodes, &clusters,       &payload, &placements.device(), &top_nodes.device(),
+            &trees, &exact_vertices, &masks,   &scene.device()};
   }
   void make_room(uint64_t ray_count, uint64_t result_bytes);
   template <typename Take>

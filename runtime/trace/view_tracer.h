@@ -1,12 +1,18 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "pbrt_import/base/progress.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {
+
+namespace gpu {
+class DeviceAo;
+}
 
 /// A surface point from which occlusion rays start, in a tracer's space().
 struct OcclusionPoint {
@@ -33,6 +39,12 @@ struct OcclusionSums {
   double distance = 0.0; ///< in radii; with any hits a hit counts as 0.5
 };
 
+/// A picture that sums become.
+struct OcclusionPicture {
+  size_t pixels = 0;
+  double radius = 0.0; ///< of occlusion, in the units of hit distances
+};
+
 /// A tracer that is fast only if it gets the rays of a whole picture at once. All functions may be called from several
 /// threads and throw Error(kCancelled) within a part of a second.
 class ViewTracer {
@@ -49,6 +61,16 @@ public:
   /// @param progress advances by the number of points
   virtual void trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
                                std::span<OcclusionSums> sums, Progress& progress) const = 0;
+
+  /// Does the same, and leaves the points' means in a picture on the device: AO, or -1 where there is no point, and hit
+  /// distances, or 0.
+  /// @param reused a picture whose memory may be used, or null
+  virtual std::shared_ptr<gpu::DeviceAo>
+  leave_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                  const OcclusionPicture& picture, std::shared_ptr<gpu::DeviceAo> reused, Progress& progress) const = 0;
+  /// Reads such a picture, one entry per pixel.
+  virtual void read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao,
+                              std::span<float> hit_distance) const = 0;
 
   /// Whether trace_occlusion() works on this device for any hits or nearest hits.
   virtual bool traces_occlusion(bool nearest) const = 0;

@@ -97,6 +97,7 @@ public:
     const Camera framed = framing_camera(source_.world_bounds(), size, source_.cameras());
     const Camera seen = options_.camera < source_.cameras().size() ? source_.cameras()[options_.camera] : framed;
     out["frames"] = measure_gpu_frames(file_, source_, seen, size, options_.gpu, options_.repeats);
+    out["moved_placements"] = measure_gpu_placements(file_, source_, options_.gpu, options_.repeats);
     if (options_.only_frames) return out;
     if (options_.camera < source_.cameras().size()) {
       view_ = camera_record(PrimaryCamera(source_.cameras()[options_.camera], size), tracer_.space());

@@ -11,6 +11,7 @@
 #include "runtime/gpu/device/kernel.h"
 #include "runtime/gpu/shaders/spirv.h"
 #include "runtime/stopwatch.h"
+#include "runtime/trace/gpu/gpu_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -140,6 +141,37 @@ Json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const
           {"still", still.json(floor, size.pixels())},
           {"largest_difference", most},
           {"rms_difference", std::sqrt(squares / static_cast<double>(size.pixels()))}};
+}
+
+Json measure_gpu_placements(const BakedFile& file, const PackedSource& source, const GpuConfig& device,
+                            uint32_t repeats) {
+  const auto instances = source.instances();
+  if (instances.size() < 2) return nullptr;
+  Movers movers;
+  const size_t moving = std::max<size_t>(instances.size() / 100, 1);
+  std::vector<Affine> places;
+  for (size_t i = 0; i < moving; ++i) {
+    const size_t instance = i * instances.size() / moving;
+    movers.instances.push_back(static_cast<uint32_t>(instance));
+    places.push_back(instances[instance].world_from_object);
+  }
+  movers.world = source.world_bounds();
+  GpuTracer tracer(file, source, device, movers);
+  const uint64_t all_bytes = tracer.scene().uploaded_bytes();
+  std::vector<double> ms, bytes;
+  const float step = static_cast<float>(1e-5 * glm::length(movers.world.hi - movers.world.lo));
+  for (uint32_t i = 0; i < repeats; ++i) {
+    for (Affine& place : places) place[3].x += step;
+    const Stopwatch watch;
+    tracer.place_instances(movers.instances, places);
+    ms.push_back(watch.seconds() * 1e3);
+    bytes.push_back(static_cast<double>(tracer.scene().uploaded_bytes()));
+  }
+  return {{"instances", instances.size()},
+          {"moved", moving},
+          {"all_bytes", all_bytes},
+          {"uploaded_bytes", median(bytes)},
+          {"place_ms", median(ms)}};
 }
 
 } // namespace packtrace

@@ -40,7 +40,7 @@ public:
 
   void resize(ImageSize size) override;
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) override;
-  const DenoisedAo& denoise() override;
+  const DenoisedAo& denoise(bool with_variance) override;
   std::vector<std::byte> save() const override { return has_frame_ ? denoiser_.save() : std::vector<std::byte>(); }
   void restore(ImageSize size, std::span<const std::byte> bytes) override;
   void reset() override { has_frame_ = false; }
@@ -100,12 +100,15 @@ void GpuPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySo
                                   {&gbuffer.motion_px[0].x, 2 * n},
                                   gbuffer.previous_z,
                                   ao.max_history,
-                                  ao.ao});
+                                  ao.ao,
+                                  ao.on_gpu.get()});
   has_frame_ = true;
 }
 
-const DenoisedAo& GpuPipeline::denoise() {
-  if (has_frame_) filtered_ = denoiser_.filter(terms_, {result_.ao, result_.variance, result_.tspp});
+const DenoisedAo& GpuPipeline::denoise(bool with_variance) {
+  if (has_frame_)
+    filtered_ = denoiser_.filter(
+        terms_, {result_.ao, with_variance ? std::span<float>(result_.variance) : std::span<float>(), result_.tspp});
   return result_;
 }
 

@@ -33,7 +33,7 @@ public:
 
   void resize(ImageSize size) override;
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) override;
-  const DenoisedAo& denoise() override;
+  const DenoisedAo& denoise(bool with_variance) override;
   std::vector<std::byte> save() const override;
   void restore(ImageSize size, std::span<const std::byte> bytes) override;
   void reset() override { frames_ = 0; }
@@ -102,7 +102,7 @@ void ReferencePipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, His
   ++frames_;
 }
 
-const DenoisedAo& ReferencePipeline::denoise() {
+const DenoisedAo& ReferencePipeline::denoise(bool) {
   if (frames_ == 0) return result_;
   const Plane<float>& shown = disocclusion_blur(now_.surfaces, now_.history.tspp, now_.history.value, config_, passes_);
   const ImageSize size = result_.size;

@@ -79,6 +79,14 @@ struct OcclusionRecord {
   float inverse_radius, lambda, darkening, end, floor, scale, parabola;
 };
 
+/// Points whose sums become pixels.
+struct OcclusionImageRecord {
+  double per_sample; ///< 1 / sample_count
+  double radius;     ///< of occlusion, in the units of hit distances
+  uint32_t point_count, sample_count, pixel_count;
+  uint32_t nearest; ///< 1: sums of nearest hits; 0: counts of any hits
+};
+
 /// Which sample points a pixel gets, and in which order.
 inline constexpr uint32_t kNetOrder = 0;       ///< SamplerKind::kSpaceTimeNet, by number
 inline constexpr uint32_t kDirectionOrder = 1; ///< 256 strata along a curve: neighbouring pixels shoot in one direction

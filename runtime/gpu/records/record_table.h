@@ -140,6 +140,15 @@ inline constexpr std::array kOcclusionFields = {
     GlslField{"float", "parabola", offsetof(OcclusionRecord, parabola)},
 };
 
+inline constexpr std::array kOcclusionImageFields = {
+    GlslField{"double", "per_sample", offsetof(OcclusionImageRecord, per_sample)},
+    GlslField{"double", "radius", offsetof(OcclusionImageRecord, radius)},
+    GlslField{"uint", "point_count", offsetof(OcclusionImageRecord, point_count)},
+    GlslField{"uint", "sample_count", offsetof(OcclusionImageRecord, sample_count)},
+    GlslField{"uint", "pixel_count", offsetof(OcclusionImageRecord, pixel_count)},
+    GlslField{"uint", "nearest", offsetof(OcclusionImageRecord, nearest)},
+};
+
 inline constexpr std::array kDenoiseFields = {
     GlslField{"uint", "width", offsetof(DenoiseRecord, width)},
     GlslField{"uint", "height", offsetof(DenoiseRecord, height)},
@@ -185,6 +194,7 @@ inline constexpr std::array kRecords = {
     GlslRecord{"CameraRecord", sizeof(CameraRecord), kCameraFields},
     GlslRecord{"PointRecord", sizeof(PointRecord), kPointFields},
     GlslRecord{"OcclusionRecord", sizeof(OcclusionRecord), kOcclusionFields},
+    GlslRecord{"OcclusionImageRecord", sizeof(OcclusionImageRecord), kOcclusionImageFields},
     GlslRecord{"DenoiseRecord", sizeof(DenoiseRecord), kDenoiseFields},
 };
 

@@ -138,7 +138,8 @@ void main() {
   Variance v = variance_of(slow, history[pixel_count() + i].x, counts, sums, moves);
   precise float root = reciprocal_root(2.0 * terms.noise_tolerance * v.told + 1e-6);
   precise float precision_units = lesser(greater(kPrecisionUnits * root + 0.5, 1.0), kMostPrecision);
-  bool hit = uintBitsToFloat(guides[i].x) > 0.0;
+  // Resampled histories belong to surfaces.
+  bool hit = (has(kFollowMotion) && slow.y > 0.0) || uintBitsToFloat(guides[i].x) > 0.0;
   float value = slow.x;
   if (hit && !(slow.y > 0.0)) {
     value = filled_value(p);

@@ -27,6 +27,9 @@ constexpr uint32_t kSurfacePoints[] = {
 constexpr uint32_t kOcclusionRays[] = {
 #include <occlusion_rays.inc>
 };
+constexpr uint32_t kOcclusionImage[] = {
+#include <occlusion_image.inc>
+};
 constexpr uint32_t kOcclusionNearest[] = {
 #include <occlusion_nearest.inc>
 };
@@ -77,6 +80,7 @@ std::span<const uint32_t> camera() { return kCamera; }
 std::span<const uint32_t> copy() { return kCopy; }
 std::span<const uint32_t> surface_points() { return kSurfacePoints; }
 std::span<const uint32_t> occlusion_rays() { return kOcclusionRays; }
+std::span<const uint32_t> occlusion_image() { return kOcclusionImage; }
 std::span<const uint32_t> occlusion_nearest() { return kOcclusionNearest; }
 std::span<const uint32_t> occlusion_queue() { return kOcclusionQueue; }
 std::span<const uint32_t> occlusion_queue_partitioned() { return kOcclusionQueuePartitioned; }

@@ -14,6 +14,7 @@ std::span<const uint32_t> camera();
 std::span<const uint32_t> copy();
 std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();
+std::span<const uint32_t> occlusion_image();
 std::span<const uint32_t> occlusion_nearest();
 std::span<const uint32_t> occlusion_queue();
 /// For devices with DeviceTraits::partitioned.

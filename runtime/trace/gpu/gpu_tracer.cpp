@@ -65,20 +65,22 @@ void GpuTracer::trace_view(std::span<const Ray> rays, uint32_t ray_class, std::s
                   [&] { progress.check_cancelled(); });
 }
 
-void GpuTracer::trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
-                                std::span<OcclusionSums> sums, Progress& progress) const {
-  assert(sums.size() == points.size());
+/// Traces the rays of all points, of as many at once as there is memory for.
+void GpuTracer::trace_parts(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                            const TakeSums& take, Progress& progress) const {
   constexpr size_t kLeastPoints = 256;
-  const std::lock_guard lock(device_rays_mutex_);
   size_t at_once = points.size();
   uint64_t reported = 0;
   for (size_t first = 0; first < points.size();) {
     const size_t count = std::min(points.size() - first, at_once);
+    const auto report = [&](double share) {
+      const auto done = std::max(reported, first + static_cast<uint64_t>(share * static_cast<double>(count)));
+      progress.advance(done - std::exchange(reported, done));
+    };
     try {
-      trace_part(points.subspan(first, count), samples, sums.subspan(first, count), [&](double share) {
-        const auto done = std::max(reported, first + static_cast<uint64_t>(share * static_cast<double>(count)));
-        progress.advance(done - std::exchange(reported, done));
-      });
+      trace_part(points.subspan(first, count), samples, report);
+      take(first, count);
+      report(1.0);
       first += count;
     } catch (const Error& error) { // fewer points at once, if there is no room for so many
       if (error.kind() != ErrorKind::kLimitExceeded || count <= kLeastPoints) throw;
@@ -92,23 +94,51 @@ void GpuTracer::trace_occlusion(std::span<const OcclusionPoint> points, const Oc
 /// Traces the rays of points for which there is memory, else throws Error(kLimitExceeded).
 /// @param report of the share that is done
 void GpuTracer::trace_part(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
-                           std::span<OcclusionSums> sums, const std::function<void(double)>& report) const {
+                           const std::function<void(double)>& report) const {
   const gpu::OcclusionRecord record = occlusion_record(samples, scene_->subgroup_size());
-  gpu::DeviceRays& rays = *device_rays_;
-  rays.set_points({reinterpret_cast<const gpu::PointRecord*>(points.data()), points.size()});
-  if (samples.nearest) {
-    rays.sum_nearest(record, report);
-    rays.sums({reinterpret_cast<double*>(sums.data()), 2 * sums.size()});
-  } else {
-    rays.count_occluded(record, report);
-    std::vector<uint32_t> counts(points.size());
-    rays.counts(counts);
-    for (size_t i = 0; i < counts.size(); ++i) {
-      const double open = samples.count - counts[i];
-      sums[i] = {open, open + 0.5 * counts[i]};
+  device_rays_->set_points({reinterpret_cast<const gpu::PointRecord*>(points.data()), points.size()});
+  if (samples.nearest)
+    device_rays_->sum_nearest(record, report);
+  else
+    device_rays_->count_occluded(record, report);
+}
+
+void GpuTracer::trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+                                std::span<OcclusionSums> sums, Progress& progress) const {
+  assert(sums.size() == points.size());
+  const std::lock_guard lock(device_rays_mutex_);
+  const auto take = [&](size_t first, size_t count) {
+    const std::span<OcclusionSums> out = sums.subspan(first, count);
+    if (samples.nearest) {
+      device_rays_->sums({reinterpret_cast<double*>(out.data()), 2 * count});
+      return;
     }
-  }
-  report(1.0);
+    std::vector<uint32_t> counts(count);
+    device_rays_->counts(counts);
+    for (size_t i = 0; i < count; ++i) {
+      const double open = samples.count - counts[i];
+      out[i] = {open, open + 0.5 * counts[i]};
+    }
+  };
+  trace_parts(points, samples, take, progress);
+}
+
+std::shared_ptr<gpu::DeviceAo> GpuTracer::leave_occlusion(std::span<const OcclusionPoint> points,
+                                                          const OcclusionSamples& samples,
+                                                          const OcclusionPicture& picture,
+                                                          std::shared_ptr<gpu::DeviceAo> reused,
+                                                          Progress& progress) const {
+  const std::lock_guard lock(device_rays_mutex_);
+  std::shared_ptr<gpu::DeviceAo> out = device_rays_->empty_picture(picture.pixels, std::move(reused));
+  const auto take = [&](size_t, size_t) {
+    device_rays_->write_picture(*out, samples.count, samples.nearest, picture.radius);
+  };
+  trace_parts(points, samples, take, progress);
+  return out;
+}
+
+void GpuTracer::read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const {
+  device_rays_->read_picture(picture, ao, hit_distance);
 }
 
 void GpuTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<uint8_t> occluded) const {

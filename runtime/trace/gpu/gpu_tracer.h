@@ -35,6 +35,11 @@ public:
                   const Progress& progress) const override;
   void trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
                        std::span<OcclusionSums> sums, Progress& progress) const override;
+  std::shared_ptr<gpu::DeviceAo> leave_occlusion(std::span<const OcclusionPoint> points,
+                                                 const OcclusionSamples& samples, const OcclusionPicture& picture,
+                                                 std::shared_ptr<gpu::DeviceAo> reused,
+                                                 Progress& progress) const override;
+  void read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const override;
   bool traces_occlusion(bool nearest) const override { return nearest || device_rays_->can_count(); }
   HitSurface resolve(const RayHit& hit) const override { return packed_.resolve(hit); }
   void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) override;
@@ -51,8 +56,12 @@ public:
 
 private:
   void upload(const GpuConfig& config);
+  /// Takes the results of points [first, first + count) from the device.
+  using TakeSums = std::function<void(size_t first, size_t count)>;
+  void trace_parts(std::span<const OcclusionPoint> points, const OcclusionSamples& samples, const TakeSums& take,
+                   Progress& progress) const;
   void trace_part(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
-                  std::span<OcclusionSums> sums, const std::function<void(double)>& report) const;
+                  const std::function<void(double)>& report) const;
 
   PackedTracer packed_;
   GpuTables tables_;

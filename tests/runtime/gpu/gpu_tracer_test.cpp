@@ -186,7 +186,12 @@ TEST_F(GpuTracerTest, MovedInstances) {
   movers.world.extend(DVec3(-20)), movers.world.extend(DVec3(20));
   GpuTracer tracer(baked.file, baked.source, config_, movers);
   const Affine moved[] = {Affine(placed({0, 3, 0}, DVec3(4), 30))};
+  const uint64_t all_bytes = tracer.scene().uploaded_bytes();
   tracer.place_instances(movers.instances, moved);
+  EXPECT_GT(tracer.scene().uploaded_bytes(), 0u);
+  EXPECT_LE(tracer.scene().uploaded_bytes(), all_bytes);
+  tracer.place_instances(movers.instances, moved);
+  EXPECT_EQ(tracer.scene().uploaded_bytes(), 0u) << "nothing changed";
   Bounds near;
   near.extend(DVec3(-8, -0.5, -8)), near.extend(DVec3(8, 8, 8));
   const std::vector<Ray> rays = test::random_rays(kRays, near, tracer.space(), 3);
