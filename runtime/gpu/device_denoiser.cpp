@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
+#include <string>
 #include <utility>
 
 #include "pbrt_import/base/error.h"
@@ -45,6 +45,18 @@ std::span<const uint32_t> pass_code(uint32_t pass) {
                              : spirv::denoise_pass_4();
 }
 
+/// Throws Error(kUnsupported) if the kernels' groups are too large for the device.
+void require_limits(const Device& device) {
+  constexpr uint32_t kThreads = 1024, kSharedBytes = 32768;
+  const VkPhysicalDeviceLimits& limits = device.limits();
+  if (limits.maxComputeWorkGroupInvocations < kThreads || limits.maxComputeSharedMemorySize < kSharedBytes)
+    throw Error(ErrorKind::kUnsupported,
+                "backend gpu: the denoiser needs groups of " + std::to_string(kThreads) + " threads with " +
+                    std::to_string(kSharedBytes) + " bytes of shared memory, but " + device.name() + " has " +
+                    std::to_string(limits.maxComputeWorkGroupInvocations) + " and " +
+                    std::to_string(limits.maxComputeSharedMemorySize) + "; use --backend packed, or --denoiser off");
+}
+
 constexpr const char* kPassNames[] = {"pass 1", "pass 2", "pass 3", "pass 4"};
 
 } // namespace
@@ -77,6 +89,7 @@ struct DeviceDenoiser::State {
 DeviceDenoiser::DeviceDenoiser(const GpuConfig& device, const Passes& passes) : state_(std::make_unique<State>()) {
   State& s = *state_;
   s.device = Device::share(device);
+  require_limits(*s.device);
   const auto kernel = [&](std::span<const uint32_t> spirv, std::span<const uint32_t> constants, uint32_t bindings) {
     return std::make_unique<Kernel>(s.device, spirv, constants, bindings, sizeof(DenoiseRecord));
   };
@@ -161,7 +174,8 @@ void DeviceDenoiser::State::find_changes(const DenoiseRecord& terms) {
   if (first || !follows) return;
   bind(*compare,
        {&view_z.device(), &normal.device(), &instance.device(), &motion.device(), &past[now ^ 1].guides, &changes});
-  dispatch("compare", *compare, terms, kGroupHeight, 0);
+  dispatches.push_back({"compare", 0.0, 0}); // it ends early
+  commands.dispatch(*compare, std::as_bytes(std::span(&terms, 1)), std::min(groups(width * height, 256), 1024u), 1);
 }
 
 std::vector<DenoiserDispatch> DeviceDenoiser::add(const DenoiseRecord& terms, const DenoiserFrame& frame) {

@@ -6,7 +6,9 @@
 
 layout(constant_id = 0) const uint kRadius = 4u; // of the window, at most 4
 
-layout(local_size_x = 32, local_size_y = 8) in;
+// Shared memory limits how many groups run at once, so they have many threads.
+layout(local_size_x = 32, local_size_y = 16) in;
+const uint kThreads = 512u;
 layout(std430, binding = 0) readonly restrict buffer Samples { vec2 samples[]; };
 layout(std430, binding = 1) restrict buffer History { vec2 history[]; };
 layout(std430, binding = 2) writeonly restrict buffer Trend { uint trend[]; };
@@ -18,14 +20,14 @@ shared vec4 s_sums[(kHigh + 2 * kBorder) * kWide];  // value, square, change, ch
 
 void load_samples(ivec2 origin) {
   const int stride = kWide + 2 * kBorder;
-  for (uint i = gl_LocalInvocationIndex; i < s_sample.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_sample.length(); i += kThreads) {
     ivec2 p = origin + ivec2(int(i) % stride, int(i) / stride) - kBorder;
     s_sample[i] = inside(p) ? samples[index_of(p)] : vec2(-1.0, 0.0);
   }
 }
 
 void sum_rows() {
-  for (uint i = gl_LocalInvocationIndex; i < s_count.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_count.length(); i += kThreads) {
     uint at = i / kWide * (kWide + 2 * kBorder) + i % kWide + kBorder;
     vec2 c = s_sample[at], l = s_sample[at - 1u], r = s_sample[at + 1u];
     uint narrow = uint(l.x >= 0.0) + uint(c.x >= 0.0) + uint(r.x >= 0.0), count = narrow;
@@ -91,8 +93,6 @@ void main() {
   barrier();
   sum_rows();
   barrier();
-  for (uint y = gl_LocalInvocationID.y; y < kHigh; y += 8u) {
-    ivec2 p = origin + ivec2(gl_LocalInvocationID.x, y);
-    if (inside(p)) correct(p, y * kWide + gl_LocalInvocationID.x);
-  }
+  ivec2 p = origin + ivec2(gl_LocalInvocationID.xy);
+  if (inside(p)) correct(p, gl_LocalInvocationIndex);
 }

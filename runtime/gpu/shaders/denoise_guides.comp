@@ -4,7 +4,9 @@
 // runtime/denoise/kernels/filter_rows_body.h.
 #include "denoise.glsl"
 
-layout(local_size_x = 32, local_size_y = 8) in;
+// Shared memory limits how many groups run at once, so they have many threads.
+layout(local_size_x = 32, local_size_y = 16) in;
+const uint kThreads = 512u;
 layout(std430, binding = 0) readonly restrict buffer Guides { uvec4 guides[]; };
 layout(std430, binding = 1) readonly restrict buffer Changes { uint changes[]; };
 layout(std430, binding = 2) writeonly restrict buffer PairGuides { uint pair_guides[]; }; // planes of the steps 1, 2, 4
@@ -34,7 +36,7 @@ float smaller_difference(float before, float centre, float after) {
 }
 
 void load_surfaces(ivec2 origin) {
-  for (uint i = gl_LocalInvocationIndex; i < s_dx.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_dx.length(); i += kThreads) {
     ivec2 p = origin + ivec2(int(i) % kStride - kSide, int(i) / kStride - 1);
     uvec4 guide = inside(p) ? guides[index_of(p)] : uvec4(0u);
     float here = uintBitsToFloat(guide.x);
@@ -74,7 +76,7 @@ uint pair_weights(int p, int apart) {
 }
 
 void find_near() {
-  for (uint i = gl_LocalInvocationIndex; i < s_near.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_near.length(); i += kThreads) {
     int x = int(i) % kStride, y = int(i) / kStride;
     bool wanted = x >= 0 && x < kStride && y < kRows - 1;
     // Pairs that leave the loaded surfaces belong to no pixel whose neighbours count.
@@ -89,7 +91,7 @@ void find_near() {
 uint byte_of(uint word, int i) { return (word >> (8 * i)) & 255u; }
 
 void find_lone() {
-  for (uint i = gl_LocalInvocationIndex; i < s_lone.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_lone.length(); i += kThreads) {
     int at = (int(i) / kLoneStride + 1) * kStride + int(i) % kLoneStride + kSide - 4, above = at - kStride;
     uint here = s_near[at];
     uint company = byte_of(here, 0) + byte_of(s_near[at - 1], 0) + byte_of(here, 1) + byte_of(s_near[above], 1) +
@@ -121,13 +123,11 @@ void main() {
   barrier();
   find_lone();
   barrier();
-  for (int y = int(gl_LocalInvocationID.y); y < kHigh; y += 8) {
-    ivec2 local = ivec2(gl_LocalInvocationID.x, y), p = origin + local;
-    if (!inside(p)) continue;
-    int at = (local.y + 1) * kStride + local.x + kSide, lone = local.y * kLoneStride + local.x + 4;
-    uint i = index_of(p);
-    pair_guides[i] = raised_weights(s_near[at], lone, 1);
-    pair_guides[pixel_count() + i] = raised_weights(pair_weights(at, 2), lone, 2);
-    pair_guides[2u * pixel_count() + i] = raised_weights(pair_weights(at, 4), lone, 4);
-  }
+  ivec2 local = ivec2(gl_LocalInvocationID.xy), p = origin + local;
+  if (!inside(p)) return;
+  int at = (local.y + 1) * kStride + local.x + kSide, lone = local.y * kLoneStride + local.x + 4;
+  uint i = index_of(p);
+  pair_guides[i] = raised_weights(s_near[at], lone, 1);
+  pair_guides[pixel_count() + i] = raised_weights(pair_weights(at, 2), lone, 2);
+  pair_guides[2u * pixel_count() + i] = raised_weights(pair_weights(at, 4), lone, 4);
 }

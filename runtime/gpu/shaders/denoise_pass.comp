@@ -4,7 +4,13 @@
 // weigh_row(), normalise_row(), exchange_row() and raise_precisions() of runtime/denoise/kernels/filter_rows_body.h.
 #include "denoise.glsl"
 
-layout(local_size_x = 32, local_size_y = 8) in;
+// Shared memory limits how many groups run at once, so they have many threads.
+const uint kThreads = STEP == 4 ? 1024u : 512u;
+#if STEP == 4
+layout(local_size_x = 32, local_size_y = 32) in;
+#else
+layout(local_size_x = 32, local_size_y = 16) in;
+#endif
 layout(std430, binding = 0) readonly restrict buffer Noisy { uint noisy_in[]; };
 layout(std430, binding = 1) writeonly restrict buffer Filtered { uint noisy_out[]; };
 layout(std430, binding = 2) readonly restrict buffer PairGuides { uint pair_guides[]; };
@@ -25,7 +31,7 @@ shared uvec2 s_distance[kDistanceRows * kStride]; // of the pairs that begin at 
 shared uvec2 s_weight[kPairRows * kPairStride];   // likewise
 
 void load_noisy(ivec2 origin) {
-  for (uint i = gl_LocalInvocationIndex; i < s_noisy.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_noisy.length(); i += kThreads) {
     ivec2 p = origin + ivec2(int(i) % kStride, int(i) / kStride) - kBorder;
     s_noisy[i] = inside(p) ? noisy_in[index_of(p)] : 0u;
   }
@@ -42,7 +48,7 @@ uint distance_of(uint p, uint q) {
 }
 
 void compare() {
-  for (uint i = gl_LocalInvocationIndex; i < s_distance.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_distance.length(); i += kThreads) {
     // Where the other end was not loaded, the pair belongs to no pixel of the group.
     uint right = i + STEP, below = i + STEP * kStride;
     uint p = s_noisy[i];
@@ -63,7 +69,7 @@ uint weight_of(uint sum, uint guide, uint gain) {
 }
 
 void weigh(ivec2 origin, uint plane) {
-  for (uint i = gl_LocalInvocationIndex; i < s_weight.length(); i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < s_weight.length(); i += kThreads) {
     ivec2 local = ivec2(int(i) % kPairStride, int(i) / kPairStride), p = origin + local - 2 * STEP;
     s_weight[i] = uvec2(0u);
     if (!inside(p)) continue;
@@ -105,7 +111,7 @@ uint largest_of(Neighbours n) {
 }
 
 void normalise(ivec2 origin) {
-  for (uint i = gl_LocalInvocationIndex; i < kScaleRows * kScaleStride; i += 256u) {
+  for (uint i = gl_LocalInvocationIndex; i < kScaleRows * kScaleStride; i += kThreads) {
     ivec2 local = ivec2(int(i) % kScaleStride, int(i) / kScaleStride);
     Neighbours n = neighbours_of((local.y + STEP) * kPairStride + local.x + STEP);
 #ifdef FIRST
@@ -165,13 +171,11 @@ void main() {
   barrier();
   normalise(origin);
   barrier();
-  for (int y = int(gl_LocalInvocationID.y); y < kHigh; y += 8) {
-    ivec2 local = ivec2(gl_LocalInvocationID.x, y), p = origin + local;
-    if (!inside(p)) continue;
-    uint noisy = exchanged(local);
-    if (has(kLastPass))
-      finish(index_of(p), noisy);
-    else
-      noisy_out[index_of(p)] = noisy;
-  }
+  ivec2 local = ivec2(gl_LocalInvocationID.xy), p = origin + local;
+  if (local.y >= kHigh || !inside(p)) return;
+  uint noisy = exchanged(local);
+  if (has(kLastPass))
+    finish(index_of(p), noisy);
+  else
+    noisy_out[index_of(p)] = noisy;
 }
