@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/lod/bound/triangle_distance.h"
+#include "compress/bake/proxies/cancellation.h"
 #include "compress/bake/proxies/geometry_voxels.h"
 #include "pbrt_import/base/error.h"
 
@@ -48,6 +49,7 @@ public:
     const std::vector<uint32_t> known = nearest_;
     const auto [nx, ny, nz] = size_;
     tbb::parallel_for(int64_t{0}, int64_t{nz}, [&](int64_t z) {
+      stop_if_cancelled();
       for (int64_t y = 0; y < ny; ++y)
         for (int64_t x = 0; x < nx; ++x) {
           const size_t here = index(x, y, z);
@@ -86,10 +88,45 @@ public:
     });
   }
 
+  /// Whether samples well inside are near all of the surface. They are not where the geometry is thinner than about a
+  /// voxel: interpolated distances are positive on both sides there, and rays would pass through.
+  bool resolves_inside() const {
+    for (const auto& [a, b, c] : triangles_) {
+      stop_if_cancelled();
+      const DVec3 ab = b - a, ac = c - a;
+      const double longest = std::max({glm::length(ab), glm::length(ac), glm::length(ab - ac)});
+      const int steps = std::max(1, static_cast<int>(std::ceil(2.0 * longest)));
+      for (int u = 0; u <= steps; ++u)
+        for (int v = 0; u + v <= steps; ++v)
+          if (!is_near_inside(a + (ab * double(u) + ac * double(v)) / double(steps))) return false;
+    }
+    return true;
+  }
+
+  void forget_sign() {
+    for (float& d : distances_) d = std::abs(d);
+  }
+
   const VoxelIndex& size() const { return size_; }
   const std::vector<float>& distances() const { return distances_; }
 
 private:
+  /// Whether one of the 6^3 samples around a point lies at least kDeep inside.
+  bool is_near_inside(DVec3 p) const {
+    constexpr float kDeep = -0.4f; // a wall of .8 voxels or less has no such sample
+    std::array<int64_t, 3> first{}, last{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<size_t>(axis);
+      const auto low = static_cast<int64_t>(std::floor(p[axis]));
+      first[i] = std::max<int64_t>(low - 2, 0), last[i] = std::min<int64_t>(low + 3, int64_t{size_[i]} - 1);
+    }
+    for (int64_t z = first[2]; z <= last[2]; ++z)
+      for (int64_t y = first[1]; y <= last[1]; ++y)
+        for (int64_t x = first[0]; x <= last[0]; ++x)
+          if (distances_[index(x, y, z)] <= kDeep) return true;
+    return false;
+  }
+
   size_t count() const { return size_t{size_[0]} * size_[1] * size_[2]; }
   size_t index(int64_t x, int64_t y, int64_t z) const { return static_cast<size_t>((z * size_[1] + y) * size_[0] + x); }
 
@@ -113,13 +150,15 @@ private:
       first[i] = std::max<int64_t>(static_cast<int64_t>(std::ceil(lo[axis] - reach)), 0);
       last[i] = std::min<int64_t>(static_cast<int64_t>(std::floor(hi[axis] + reach)), int64_t{size_[i]} - 1);
     }
-    for (int64_t z = first[2]; z <= last[2]; ++z)
+    for (int64_t z = first[2]; z <= last[2]; ++z) {
+      stop_if_cancelled();
       for (int64_t y = first[1]; y <= last[1]; ++y)
         for (int64_t x = first[0]; x <= last[0]; ++x) {
           const DVec3 p(x, y, z), outside = glm::max(glm::max(lo - p, p - hi), DVec3(0.0));
           const double known = distances_[index(x, y, z)];
           if (glm::dot(outside, outside) < known * known) visit(index(x, y, z), p);
         }
+    }
   }
 
   VoxelIndex size_{};
@@ -164,6 +203,7 @@ GeometryField build_field(const OccludingTriangles& source, const ProxyConfig& c
     const VoxelSet inside = inside_voxels(source, config.voxels);
     result.has_sign = inside.count() > 0; // not of sheets with two sides
     if (result.has_sign) builder.negate_inside(inside);
+    if (result.has_sign && !builder.resolves_inside()) builder.forget_sign(), result.has_sign = false;
   }
   result.field = encode_field(builder.size(), builder.distances(), config.field_bits);
   result.edge = frame.edge;

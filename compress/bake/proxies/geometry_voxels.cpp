@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "compress/bake/lod/bound/triangle_distance.h"
+#include "compress/bake/proxies/cancellation.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -118,6 +119,7 @@ private:
     for (const OccludingTriangle& t : source_.triangles)
       TriangleVoxels(grid_.triangle(t), grid_.edge, grid_.size, config_.rule)
           .for_each_row([&](uint32_t y, uint32_t z, uint32_t first, uint32_t last) {
+            stop_if_cancelled();
             for (uint32_t x = first; x <= last; ++x)
               if (!t.masked || opaque_within(file_, runs_, t, edge * DVec3(x, y, z), edge))
                 visit(t, VoxelIndex{x, y, z});
@@ -130,6 +132,7 @@ private:
     const VoxelSet before = result_.set;
     const VoxelIndex size = before.size();
     for (const OccludingTriangle& t : source_.triangles) {
+      stop_if_cancelled();
       if (t.masked) continue;
       const DVec3 center = (vec(t.corners[0]) + vec(t.corners[1]) + vec(t.corners[2])) / (3.0 * grid_.edge_steps());
       const DVec3 own = glm::clamp(glm::floor(center), DVec3(0.0), DVec3(size[0] - 1.0, size[1] - 1.0, size[2] - 1.0));
@@ -180,9 +183,11 @@ private:
                   ac = vec(t.corners[2]) * per_voxel - a;
       const double longest = std::max({glm::length(ab), glm::length(ac), glm::length(ab - ac)});
       const int steps = std::max(1, static_cast<int>(std::ceil(2.0 * longest)));
-      for (int u = 0; u <= steps; ++u)
+      for (int u = 0; u <= steps; ++u) {
+        stop_if_cancelled();
         for (int v = 0; u + v <= steps; ++v)
           largest = std::max(largest, nearest_squared(surface, a + (ab * double(u) + ac * double(v)) / double(steps)));
+      }
     }
     if (!std::isfinite(largest))
       throw Error(ErrorKind::kUsage, "voxels of " + what_ + ": parts of the geometry are far from any voxel");
@@ -235,7 +240,10 @@ VoxelFrame voxel_frame(const OccludingTriangles& source, uint32_t voxels) {
 VoxelSet inside_voxels(const OccludingTriangles& source, uint32_t voxels) {
   const FineGrid grid(source.extent, voxels);
   VoxelSet inside(grid.size);
-  for (const OccludingTriangle& t : source.triangles) add_crossings(grid.triangle(t), grid.edge, inside);
+  for (const OccludingTriangle& t : source.triangles) {
+    stop_if_cancelled();
+    add_crossings(grid.triangle(t), grid.edge, inside);
+  }
   prefix_parity(inside);
   return inside;
 }
