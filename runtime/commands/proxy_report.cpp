@@ -14,13 +14,18 @@ const char* surface_of(const ProxySummary& use) { return (use.flags & voxels::kT
 
 double per_diagonal(const ProxySummary& use, double error) { return error / (use.edge * std::sqrt(3.0)); }
 
+const char* sign_of(const ProxySummary& use) {
+  if ((use.flags & voxels::kSigned) != 0) return "signed";
+  return (use.flags & voxels::kClosedSource) != 0 ? "unsigned: parts are thinner than a voxel"
+                                                  : "unsigned: the geometry is open";
+}
+
 std::string field_line(const ProxySummary& use) {
   return fmt::format(grouped(),
                      "proxy {}: distance field {} x {} x {}, {}, edge {:.4g}; {:L} samples stored in {:L} bits, error "
                      "{:.3g} within {} voxels of the surface\n",
-                     use.name.empty() ? "(no name)" : use.name, use.size[0], use.size[1], use.size[2],
-                     (use.flags & voxels::kSigned) != 0 ? "signed" : "unsigned: the geometry is open", use.edge,
-                     use.stored_voxels, use.bits, use.surface_error, voxels::kFieldBand);
+                     use.name.empty() ? "(no name)" : use.name, use.size[0], use.size[1], use.size[2], sign_of(use),
+                     use.edge, use.stored_voxels, use.bits, use.surface_error, voxels::kFieldBand);
 }
 
 std::string line_of(const ProxySummary& use) {

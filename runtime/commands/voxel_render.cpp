@@ -27,17 +27,36 @@ constexpr const char *kVoxelView = "voxels", *kFieldView = "sdf";
 
 /// Options that other views have, and that would be ignored here.
 void refuse_other_options(const RenderOptions& options) {
+  const RenderOptions defaults;
+  const AoOptions &ao = options.ao, &ao_defaults = defaults.ao;
   const bool sequence = options.sequence.path || options.sequence.keys || options.sequence.start_time;
-  const std::array<std::pair<const char*, bool>, 8> given = {{{"--aov", !options.aovs.empty()},
-                                                              {"--frames", options.frames.has_value()},
-                                                              {"--ground-truth", options.ground_truth},
-                                                              {"--supersample", options.supersample != 1},
-                                                              {"--backend", options.backend.has_value()},
-                                                              {"--bvh", options.bvh.has_value()},
-                                                              {"--lod-error", options.lod.error_px.has_value()},
-                                                              {"--path, --keys and --start-time", sequence}}};
+  const bool denoiser = options.denoiser != defaults.denoiser || !options.denoiser_settings.empty();
+  const std::array<std::pair<const char*, bool>, 20> given = {{
+      {"--aov", !options.aovs.empty()},
+      {"--frames", options.frames.has_value()},
+      {"--ground-truth", options.ground_truth},
+      {"--supersample", options.supersample != 1},
+      {"--no-jitter", options.no_jitter},
+      {"--no-legend", options.no_legend},
+      {"--seed", options.seed != 0},
+      {"the denoiser's options", denoiser},
+      {"--ao-resolution", ao.resolution != ao_defaults.resolution},
+      {"--ao-rate", ao.rate != ao_defaults.rate},
+      {"--ao-sampler", ao.sampler != ao_defaults.sampler},
+      {"--ao-no-falloff", ao.no_falloff},
+      {"--ao-interreflection", ao.interreflection.has_value()},
+      {"--ao-set", !ao.settings.empty()},
+      {"--backend", options.backend.has_value() || options.gpu_device.has_value()},
+      {"--bvh", options.bvh.has_value()},
+      {"--fast-edges", options.fast_edges},
+      {"--lod-error", options.lod.error_px.has_value()},
+      {"--proxy-beyond", options.proxy_beyond_px.has_value()},
+      {"--path, --keys and --start-time", sequence},
+  }};
+  std::vector<std::string> names;
   for (const auto& [name, is_given] : given)
-    if (is_given) throw Error(ErrorKind::kUsage, std::string(name) + " has no effect with --view voxels");
+    if (is_given) names.emplace_back(name);
+  refuse_without_effect(names, "--view " + options.shade.view);
 }
 
 Image picture_of(const VoxelPicture& traced, ImageSize size) {

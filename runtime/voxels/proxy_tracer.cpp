@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "compress/format/voxels/proxy_section.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {
@@ -14,9 +15,7 @@ Bounds placed_box_of(const BakedFile& file, const PlacedGeometry& instance) {
 
 std::vector<uint8_t> geometries_with_proxies(const BakedFile& file) {
   std::vector<uint8_t> result(file.geometries().size());
-  const std::span<const uint8_t> bytes = proxy_bytes(file);
-  if (bytes.empty()) return result;
-  for (const Proxy& proxy : read_proxies(bytes)) result[proxy.record.geometry] = 1;
+  for (const Proxy& proxy : read_proxies(proxy_bytes(file))) result[proxy.record.geometry] = 1;
   return result;
 }
 
@@ -24,12 +23,15 @@ std::vector<uint8_t> geometries_with_proxies(const BakedFile& file) {
 
 std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& source, const PrimaryCamera& view,
                                       double pixels) {
+  if (proxy_bytes(file).empty())
+    throw Error(ErrorKind::kUnsupported, "the file has no proxies for --proxy-beyond; bake it with --proxy voxels");
   const std::vector<uint8_t> has_proxy = geometries_with_proxies(file);
   const std::span<const PlacedGeometry> instances = source.instances();
   const bool perspective = view.projection() != Projection::kOrthographic;
   std::vector<uint32_t> result;
   for (uint32_t i = 0; i < instances.size(); ++i) {
-    if (has_proxy[instances[i].geometry] == 0) continue;
+    const baked::GeometryRecord& geometry = file.geometries()[instances[i].geometry];
+    if (has_proxy[instances[i].geometry] == 0 || (geometry.flags & baked::kWorldSpace) != 0) continue;
     const double determinant = glm::determinant(glm::dmat3(DAffine(instances[i].world_from_object)));
     if (determinant == 0.0 || !std::isfinite(determinant)) continue;
     const Bounds box = placed_box_of(file, instances[i]);
@@ -44,20 +46,10 @@ std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& 
 ProxyTracer::ProxyTracer(const BakedFile& file, const SceneSource& source, std::vector<uint32_t> proxied,
                          const TracerConfig& config)
     : proxied_(std::move(proxied)),
-      voxels_(file, [this](uint32_t i) { return std::ranges::binary_search(proxied_, i); }) {
-  TracerConfig others = config;
-  others.movers.instances = proxied_;
-  for (const uint32_t i : proxied_) others.movers.world.extend(placed_box_of(file, source.instances()[i]));
-  others_ = make_tracer(source, &file, others);
-  // A flattened instance is not traced.
-  std::vector<Affine> flat;
-  for (const uint32_t i : proxied_) {
-    Affine placement = source.instances()[i].world_from_object;
-    for (int column = 0; column < 3; ++column) placement[column] = Vec3(0.0f);
-    flat.push_back(placement);
-  }
-  others_->place_instances(proxied_, flat);
-}
+      voxels_(file, [this](uint32_t i) { return std::ranges::binary_search(proxied_, i); }),
+      source_(source, proxied_,
+              config.backend == Backend::kEmbree ? OtherInstances::Absent::kNoGeometry : OtherInstances::Absent::kFlat),
+      others_(make_tracer(source_, &file, config)) {}
 
 float ProxyTracer::voxel_distance(const Ray& ray) const {
   if (!(ray.tfar > ray.tnear)) return ray.tfar;
@@ -86,7 +78,7 @@ void ProxyTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrd
 
 std::vector<ResidentPart> ProxyTracer::resident() const {
   std::vector<ResidentPart> parts = others_->resident();
-  parts.push_back({"proxies", voxels_.resident_bytes()});
+  parts.push_back({"proxies", voxels_.resident_bytes() + source_.bytes()});
   return parts;
 }
 

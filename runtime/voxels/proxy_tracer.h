@@ -7,12 +7,15 @@
 
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/trace/make_tracer.h"
+#include "runtime/voxels/other_instances.h"
 #include "runtime/voxels/voxel_scene.h"
 
 namespace packtrace {
 
 /// Instances that have a voxel proxy and are seen smaller than so many pixels: the diameter of the sphere around their
-/// box over the length of a pixel at its nearest point. Flat instances are not among them. Ascending.
+/// box over the length of a pixel at its nearest point. Flat instances and those of the
+/// tree of world space are not among them. Ascending. Throws
+/// Error(kUnsupported) for a file without proxies.
 /// @param source of the file, as it is placed
 std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& source, const PrimaryCamera& view,
                                       double pixels);
@@ -25,6 +28,7 @@ std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& 
 class ProxyTracer final : public RayTracer {
 public:
   /// @param proxied instances, as small_instances() gives them; not empty
+  /// @param source must outlive the tracer
   /// @param config of the tracer of the others, without movers
   /// Throws like make_tracer().
   ProxyTracer(const BakedFile& file, const SceneSource& source, std::vector<uint32_t> proxied,
@@ -52,6 +56,7 @@ private:
 
   std::vector<uint32_t> proxied_;
   VoxelScene voxels_;
+  OtherInstances source_;
   std::unique_ptr<RayTracer> others_;
 };
 

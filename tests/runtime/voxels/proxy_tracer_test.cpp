@@ -1,0 +1,129 @@
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "compress/format/file/baked_file.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/trace/source/packed_source.h"
+#include "runtime/voxels/proxy_tracer.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+/// Balls of radius 1 in a row away from the eye.
+BakedFile row_of_balls(uint32_t count, bool proxies) {
+  Scene scene;
+  scene.materials.emplace_back();
+  scene.meshes.push_back(test::sphere_mesh(30));
+  scene.objects.push_back({"ball", {Shape{0, 0, false, DAffine(1.0)}}});
+  for (uint32_t i = 0; i < count; ++i)
+    scene.instances.push_back({0, Affine(test::translation(DVec3(i % 3, 0.0, 6.0 * (i + 1))))});
+  BakeConfig config;
+  if (proxies) config.proxy.use = ProxyUse::kVoxels, config.proxy.voxels = 24;
+  return BakedFile::from_bytes(test::bake(scene, config).bytes);
+}
+
+/// Looks from the file's zero along z.
+PrimaryCamera camera_of(const BakedFile& file) {
+  Camera camera;
+  camera.world_from_camera = test::translation(-file.origin());
+  camera.fov_degrees = 60.0;
+  return {camera, ImageSize{100, 100}};
+}
+
+TEST(ProxyTracer, ThoseThatLookSmallAreChosenByTheirDistance) {
+  const BakedFile file = row_of_balls(40, true);
+  const PackedSource source(file);
+  const std::vector<uint32_t> small = small_instances(file, source, camera_of(file), 8.0);
+  ASSERT_GT(small.size(), 3u);
+  ASSERT_LT(small.size(), 37u);
+  EXPECT_TRUE(std::ranges::is_sorted(small));
+  EXPECT_EQ(small.back(), 39u);
+  EXPECT_EQ(small.size(), 40u - small.front()); // all behind the first
+  EXPECT_EQ(small_instances(file, source, camera_of(file), 1e6).size(), 40u);
+  const BakedFile without = row_of_balls(4, false);
+  EXPECT_THROW(small_instances(without, PackedSource(without), camera_of(without), 8.0), Error);
+}
+
+/// Every query equals the nearer of the triangles of large instances and the voxels of small ones.
+void compare(Backend backend, uint32_t first_small) {
+  const BakedFile file = row_of_balls(30, true);
+  const PackedSource source(file);
+  std::vector<uint32_t> small;
+  for (uint32_t i = first_small; i < 30; ++i) small.push_back(i);
+  TracerConfig config;
+  config.backend = backend;
+  const ProxyTracer tracer(file, source, small, config);
+  const std::unique_ptr<RayTracer> whole = make_tracer(source, &file, config);
+  const VoxelScene voxels(file, [&](uint32_t i) { return i >= first_small; });
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  uint32_t of_voxels = 0, of_triangles = 0;
+  for (int n = 0; n < 4000; ++n) {
+    const DVec3 origin =
+        DVec3(8.0 * unit(random) - 3.0, 4.0 * unit(random) - 2.0, 190.0 * unit(random)) - file.origin();
+    const DVec3 aim(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5), direction = glm::normalize(aim);
+    const auto ray_in = [&](const UnitSpace& space) {
+      Ray ray;
+      ray.origin = Vec3(space.to_unit(origin)), ray.tfar = 40.0f;
+      ray.direction = Vec3(direction / space.inverse_scale());
+      return ray;
+    };
+    // Triangles of small instances do not count: rays pass them one after another.
+    float expected = 40.0f;
+    Ray rest = ray_in(whole->space());
+    for (RayHit hit; rest.tnear < 40.0f; rest.tnear = hit.t * 1.00001f) {
+      whole->closest_hits({&rest, 1}, kOcclusionRays, RayOrder::kIncoherent, {&hit, 1});
+      if (!hit.valid()) break;
+      if (whole->resolve(hit).placement->instance >= first_small) continue;
+      expected = hit.t;
+      break;
+    }
+    const bool by_triangle = expected < 40.0f;
+    const double at = voxels.first_distance(origin, direction, 0.0, double{expected});
+    const Ray ray = ray_in(tracer.space());
+    RayHit hit;
+    uint8_t occluded = 2;
+    tracer.closest_hits({&ray, 1}, kOcclusionRays, RayOrder::kIncoherent, {&hit, 1});
+    tracer.any_hits({&ray, 1}, kOcclusionRays, RayOrder::kIncoherent, {&occluded, 1});
+    ASSERT_EQ(occluded, at < 40.0 ? 1 : 0) << n;
+    ASSERT_EQ(hit.valid(), at < 40.0) << n;
+    ASSERT_TRUE(!hit.valid() || std::abs(double{hit.t} - at) < 1e-3) << n;
+    (at < double{expected} ? of_voxels : of_triangles) += at < double{expected} || by_triangle ? 1 : 0;
+  }
+  EXPECT_GT(of_voxels, 100u);
+  EXPECT_EQ(of_triangles > 100, first_small > 0);
+}
+
+TEST(ProxyTracer, RaysSeeTrianglesOfLargeInstancesAndVoxelsOfSmallOnes) {
+  compare(Backend::kPacked, 15);
+  compare(Backend::kEmbree, 15);
+}
+
+TEST(ProxyTracer, AllInstancesMayBeSmall) {
+  compare(Backend::kPacked, 0);
+  compare(Backend::kEmbree, 0);
+}
+
+TEST(ProxyTracer, InstancesSeenAsVoxelsTakeNoPlacements) {
+  const BakedFile file = row_of_balls(300, true);
+  const PackedSource source(file);
+  std::vector<uint32_t> small;
+  for (uint32_t i = 20; i < 300; ++i) small.push_back(i);
+  TracerConfig config;
+  config.backend = Backend::kPacked;
+  const auto placements = [](const RayTracer& tracer) {
+    for (const ResidentPart& part : tracer.resident())
+      if (part.name == "placements") return part.bytes;
+    return uint64_t{0};
+  };
+  const std::unique_ptr<RayTracer> whole = make_tracer(source, &file, config);
+  EXPECT_LT(placements(ProxyTracer(file, source, small, config)), placements(*whole) * 3 / 4);
+}
+
+} // namespace
+} // namespace packtrace
