@@ -1,7 +1,9 @@
 // Compares the voxels of a baked file with an on/off grid of NanoVDB: bytes, and rays per second, over the same voxels
-// and rays. Usage: packtrace_voxel_benchmark FILE.ptk [RAYS]; the file is baked with --proxy voxels.
+// and rays; and their bits with those of a pointerless octree. Usage: packtrace_voxel_benchmark FILE.ptk [RAYS]; the
+// file is baked with --proxy voxels.
 
 #include <algorithm>
+#include <bit>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -14,6 +16,7 @@
 #include <nanovdb/util/Ray.h>
 #include <openvdb/openvdb.h>
 
+#include "compress/format/voxels/cell_pyramid.h"
 #include "compress/format/voxels/proxy_codec.h"
 #include "compress/format/voxels/proxy_section.h"
 #include "runtime/stopwatch.h"
@@ -38,6 +41,16 @@ std::vector<BenchmarkRay> make_rays(const VoxelIndex& size, size_t count) {
     rays.push_back({glm::vec3(eye), glm::vec3(extent * glm::dvec3(uniform(), uniform(), uniform()) - eye)});
   }
   return rays;
+}
+
+/// Bits of an octree of the voxels without pointers or index: 8 bits a node down to the voxels, from a cube of 2^n.
+uint64_t octree_bits(const VoxelSet& set) {
+  const uint32_t longest = std::max({set.size()[0], set.size()[1], set.size()[2]});
+  const auto levels = static_cast<uint32_t>(std::bit_width(longest - 1)) + 1;
+  const CellPyramid pyramid(set, levels);
+  uint64_t nodes = 0;
+  for (uint32_t k = 1; k < levels; ++k) nodes += pyramid.any_count(k);
+  return 8 * nodes;
 }
 
 /// Best of three.
@@ -100,11 +113,13 @@ void compare(const Proxy& proxy, size_t ray_count) {
   const auto mrays = [&](double seconds) { return static_cast<double>(rays.size()) * 1e-6 / seconds; };
   const VoxelIndex& size = proxy.voxels.size();
   std::printf(
-      "{\"size\": [%u, %u, %u], \"voxels\": %llu, \"bits_per_voxel\": %.3f, \"bytes\": {\"packtrace\": %llu, "
+      "{\"size\": [%u, %u, %u], \"voxels\": %llu, \"bits_per_voxel\": %.3f, \"octree_bits_per_voxel\": %.3f, "
+      "\"bytes\": {\"packtrace\": %llu, "
       "\"nanovdb\": %llu, \"ratio\": %.4f}, \"mrays_per_s\": {\"packtrace\": %.3f, \"nanovdb\": %.3f, \"ratio\": "
       "%.3f}, \"hits\": %llu, \"different\": %llu}\n",
       size[0], size[1], size[2], static_cast<unsigned long long>(set.count()),
       static_cast<double>(proxy.voxels.bits()) / static_cast<double>(set.count()),
+      static_cast<double>(octree_bits(set)) / static_cast<double>(set.count()),
       static_cast<unsigned long long>(proxy.voxels.bits() / 8), static_cast<unsigned long long>(handle.size()),
       static_cast<double>(proxy.voxels.bits() / 8) / static_cast<double>(handle.size()), mrays(our_s), mrays(their_s),
       their_s / our_s, static_cast<unsigned long long>(hits), static_cast<unsigned long long>(different));

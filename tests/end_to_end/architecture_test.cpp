@@ -159,6 +159,7 @@ const std::vector<Room> kRooms = {
      {"pbrt_import/base",
       "pbrt_import/scene",
       "pbrt_import/text",
+      "pbrt_import/files",
       "pbrt_import",
       "compress/format/deformation",
       "compress/format/file",
