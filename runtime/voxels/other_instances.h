@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,8 +42,8 @@ public:
   std::optional<Vec3> shading_normal(uint32_t g, uint32_t triangle, Vec2 barycentrics) const override {
     return source_.shading_normal(g, triangle, barycentrics);
   }
-  Vec2 uv(uint32_t g, uint32_t triangle, Vec2 barycentrics) const override {
-    return source_.uv(g, triangle, barycentrics);
+  std::array<Vec2, 3> corner_uvs(uint32_t g, uint32_t triangle) const override {
+    return source_.corner_uvs(g, triangle);
   }
   float position_error(uint32_t g) const override { return has(g) ? source_.position_error(g) : 0.0f; }
   std::span<const PlacedGeometry> instances() const override { return instances_; }

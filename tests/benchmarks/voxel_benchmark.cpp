@@ -47,7 +47,7 @@ std::vector<BenchmarkRay> make_rays(const VoxelIndex& size, size_t count) {
 uint64_t octree_bits(const VoxelSet& set) {
   const uint32_t longest = std::max({set.size()[0], set.size()[1], set.size()[2]});
   const auto levels = static_cast<uint32_t>(std::bit_width(longest - 1)) + 1;
-  const CellPyramid pyramid(set, levels);
+  const CellPyramid pyramid(set, levels, nullptr);
   uint64_t nodes = 0;
   for (uint32_t k = 1; k < levels; ++k) nodes += pyramid.any_count(k);
   return 8 * nodes;
