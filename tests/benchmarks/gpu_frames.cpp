@@ -146,12 +146,17 @@ Json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const
 Json measure_gpu_placements(const BakedFile& file, const PackedSource& source, const GpuConfig& device,
                             uint32_t repeats) {
   const auto instances = source.instances();
-  if (instances.size() < 2) return nullptr;
+  std::map<uint32_t, uint32_t> uses;
+  for (const PlacedGeometry& instance : instances) ++uses[instance.geometry];
+  std::vector<size_t> movable; // Geometry that is placed once may be in the world's tree.
+  for (size_t i = 0; i < instances.size(); ++i)
+    if (uses[instances[i].geometry] > 1) movable.push_back(i);
+  if (movable.empty()) return nullptr;
   Movers movers;
-  const size_t moving = std::max<size_t>(instances.size() / 100, 1);
+  const size_t moving = std::max<size_t>(movable.size() / 100, 1);
   std::vector<Affine> places;
   for (size_t i = 0; i < moving; ++i) {
-    const size_t instance = i * instances.size() / moving;
+    const size_t instance = movable[i * movable.size() / moving];
     movers.instances.push_back(static_cast<uint32_t>(instance));
     places.push_back(instances[instance].world_from_object);
   }

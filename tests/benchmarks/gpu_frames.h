@@ -20,7 +20,8 @@ double median(std::vector<double> values);
 nlohmann::json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const Camera& camera,
                                   ImageSize size, const GpuConfig& device, uint32_t repeats);
 
-/// Measures the time and the uploaded bytes of moving a hundredth of a scene's instances; null if there is only one.
+/// Measures the time and the uploaded bytes of moving a hundredth of a scene's instances; null if no geometry is placed
+/// twice.
 nlohmann::json measure_gpu_placements(const BakedFile& file, const PackedSource& source, const GpuConfig& device,
                                       uint32_t repeats);
 
