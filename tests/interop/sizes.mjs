@@ -76,7 +76,7 @@ function errors(reference, test, reach, samples = 200000) {
     next[i] = heads[h], heads[h] = i;
   }
   const all = reference.positions.length / 3, stride = Math.max(1, Math.floor(all / samples));
-  let squares = 0, largest = 0, sampled = 0, lost = 0, angles = 0, widest = 0, angled = 0;
+  let squares = 0, largest = 0, sampled = 0, lost = 0, angles = 0, widest = 0, angled = 0, turned_far = 0;
   for (let i = 0; i < all; i += stride) {
     const p = reference.positions.subarray(3 * i, 3 * i + 3), n = reference.normals.subarray(3 * i, 3 * i + 3);
     const near = [];
@@ -98,11 +98,11 @@ function errors(reference, test, reach, samples = 200000) {
         angle = Math.min(angle, Math.atan2(Math.hypot(n[1] * m[2] - n[2] * m[1], n[2] * m[0] - n[0] * m[2], n[0] * m[1] - n[1] * m[0]),
                                            n[0] * m[0] + n[1] * m[1] + n[2] * m[2]));
       }
-    angles += angle * angle, widest = Math.max(widest, angle), ++angled;
+    angles += angle * angle, widest = Math.max(widest, angle), ++angled, turned_far += angle > 0.05;
   }
   const degrees = 180 / Math.PI;
   return { position_rms: Math.sqrt(squares / (sampled - lost)), position_max: largest, lost: lost / sampled,
-    normal_rms: angled ? degrees * Math.sqrt(angles / angled) : 0, normal_max: degrees * widest };
+    normal_rms: angled ? degrees * Math.sqrt(angles / angled) : 0, normal_max: degrees * widest, turned: angled ? turned_far / angled : 0 };
 }
 
 /** Bytes of a file by what they hold: compressed views by their use, images, JSON and the rest. */
@@ -157,7 +157,7 @@ for (const ending of ["gltfpack", "transform_meshopt", "transform_draco", "web",
   const file = at(`${ending}.glb`), e = measured[ending] ?? (await measure(`${ending}.glb`));
   const parts = Object.entries(streams(file)).map(([use, bytes]) => `${use} ${(bytes / 1000).toFixed(0)}`);
   console.log(`${ending}: ${(bytesOf(file) / 1000).toFixed(0)} kB (${parts.join(", ")}); position ${(e.position_rms / step).toFixed(2)}, ` +
-    `${(e.position_max / step).toFixed(2)}; normal ${e.normal_rms.toFixed(2)}, ${e.normal_max.toFixed(2)}${e.lost > 0 ? `; ${(100 * e.lost).toFixed(2)} % of vertices not found` : ""}`);
+    `${(e.position_max / step).toFixed(2)}; normal ${e.normal_rms.toFixed(2)}, ${e.normal_max.toFixed(2)}${e.turned > 0 ? `; ${(100 * e.turned).toFixed(3)} % of normals off by more than 3 degrees` : ""}${e.lost > 0 ? `; ${(100 * e.lost).toFixed(2)} % of vertices not found` : ""}`);
 }
 const best = Math.min(...["gltfpack", "transform_meshopt"].map((ending) => bytesOf(at(`${ending}.glb`))));
 console.log(`web takes ${(bytesOf(at("web.glb")) / best).toFixed(2)} of the smallest meshopt file`);

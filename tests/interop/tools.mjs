@@ -8,6 +8,16 @@ import draco3d from "draco3dgltf";
 import { validate } from "./validate.mjs";
 import { bytesOf, check, json, run, tool } from "./process.mjs";
 
+/** Triangles of a primitive; those of strips with equal corners only join parts. */
+function trianglesOf(primitive) {
+  const indices = primitive.getIndices()?.getArray();
+  if (primitive.getMode() !== 5) return (indices?.length ?? primitive.getAttribute("POSITION").getCount()) / 3;
+  let triangles = 0;
+  for (let i = 0; i + 2 < indices.length; ++i)
+    triangles += indices[i] !== indices[i + 1] && indices[i + 1] !== indices[i + 2] && indices[i] !== indices[i + 2];
+  return triangles;
+}
+
 /** Triangles of all nodes of a document, instances included, as glTF-Transform sees them. */
 async function placedTriangles(file) {
   const io = new NodeIO().registerExtensions(ALL_EXTENSIONS).registerDependencies({
@@ -20,8 +30,7 @@ async function placedTriangles(file) {
   for (const node of document.getRoot().listNodes()) {
     if (!node.getMesh()) continue;
     let triangles = 0;
-    for (const primitive of node.getMesh().listPrimitives())
-      triangles += (primitive.getIndices() ?? primitive.getAttribute("POSITION")).getCount() / 3;
+    for (const primitive of node.getMesh().listPrimitives()) triangles += trianglesOf(primitive);
     const instances = node.getExtension("EXT_mesh_gpu_instancing");
     total += triangles * (instances ? instances.listAttributes()[0].getCount() : 1);
   }
