@@ -49,7 +49,7 @@ void FrameConfig::validate() const {
 
 uint64_t picture_bytes(const FrameConfig& config) {
   const double pixel_bytes =
-      (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0) + (config.shades() ? 110.0 : 0.0);
+      (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0) + (config.shades() ? 300.0 : 0.0);
   constexpr double kMax = 0x1p62;
   const double side = config.supersample;
   const double bytes = pixel_bytes * side * side * static_cast<double>(config.size.width) * config.size.height;

@@ -370,7 +370,7 @@ void FrameLoop::resolve_shading(std::span<const float> ao, RenderedImage& image)
   if (still_frames_ > 0) layers_.write_guides(gbuffer_, guides_);
   const GBuffer& mean = still_frames_ > 0 ? guides_ : gbuffer_;
   const ShadedGuides guides{mean.size, mean.view_z, mean.normal, mean.instance, layers_.albedos(gbuffer_)};
-  packtrace::resolve_shading(config_, filter_shading(shaded_mean_.pixels(), guides), ao, image);
+  packtrace::resolve_shading(config_, shaded_mean_.denoised(guides), ao, image);
 }
 
 /// Reads samples that stayed on a GPU, if a layer shows them.

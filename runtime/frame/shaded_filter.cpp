@@ -161,10 +161,10 @@ float variance_of_mean(Vec3 mean, float square, float frames) {
 
 } // namespace
 
-std::vector<ShadedPixel> filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& g) {
+void filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& g, std::vector<ShadedPixel>& result) {
   const Grid grid{g.size};
   const std::vector<Guide> guides = guides_of(g, grid);
-  std::vector<ShadedPixel> result(pixels.begin(), pixels.end());
+  result.assign(pixels.begin(), pixels.end());
   std::vector<Signal> signals(pixels.size()), other;
   std::vector<float> frames(pixels.size());
   const auto base = [&](size_t i) { return glm::max(g.albedo[i], Vec3(kDark)); };
@@ -185,7 +185,6 @@ std::vector<ShadedPixel> filter_shading(std::span<const ShadedPixel> pixels, con
   filter_signal(grid, guides, frames, signals, other);
   for (size_t i = 0; i < pixels.size(); ++i)
     if (guides[i].instance != kNoInstance) result[i].specular = signals[i].colour;
-  return result;
 }
 
 } // namespace packtrace

@@ -24,6 +24,7 @@ struct ShadedGuides {
 /// pixels. Results do not depend on the number of threads. Source: Schied et al., Spatiotemporal Variance-Guided
 /// Filtering, HPG 2017; Dammertz et al., Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination
 /// Filtering, HPG 2010.
-std::vector<ShadedPixel> filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& guides);
+/// @param result receives as many elements
+void filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& guides, std::vector<ShadedPixel>& result);
 
 } // namespace packtrace

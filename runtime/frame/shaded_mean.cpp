@@ -7,6 +7,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "runtime/frame/shaded_filter.h"
 #include "runtime/shade/bsdf.h"
 
 namespace packtrace {
@@ -118,6 +119,11 @@ void ShadedMean::add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHis
       p.ambient += (frame.ambient[i] - p.ambient) / p.ambient_frames;
     }
   });
+}
+
+std::span<const ShadedPixel> ShadedMean::denoised(const ShadedGuides& guides) {
+  filter_shading(pixels_, guides, before_);
+  return before_;
 }
 
 void ShadedMean::keep_surfaces(const GBuffer& g) {

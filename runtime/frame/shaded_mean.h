@@ -11,6 +11,8 @@
 
 namespace packtrace {
 
+struct ShadedGuides; // runtime/frame/shaded_filter.h
+
 /// What the frames of a traced pixel have in common.
 struct ShadedPixel {
   Vec3 direct{0.0f}, specular{0.0f}, ambient{0.0f}; ///< means, linear sRGB radiance
@@ -44,6 +46,8 @@ public:
   void add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history);
 
   std::span<const ShadedPixel> pixels() const { return pixels_; }
+  /// pixels() without their noise: filter_shading(). Valid until the next add().
+  std::span<const ShadedPixel> denoised(const ShadedGuides& guides);
 
   std::vector<std::byte> save() const;
   /// @return false if the bytes are not those of save() for that number of pixels
@@ -60,7 +64,9 @@ private:
   };
   ShadedPixel reprojected(const GBuffer& gbuffer, size_t pixel, int x, int y) const;
 
-  std::vector<ShadedPixel> pixels_, before_;
+  std::vector<ShadedPixel> pixels_;
+  /// While a frame is added, the pixels of the one before; then memory for denoised().
+  std::vector<ShadedPixel> before_;
   std::vector<Surface> surfaces_; ///< of pixels_
 };
 
