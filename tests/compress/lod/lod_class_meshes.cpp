@@ -263,6 +263,35 @@ Mesh strands_mesh(uint32_t count, uint32_t steps, uint32_t sides, double radius,
   return mesh;
 }
 
+Mesh fins_mesh(uint32_t count, uint32_t steps, uint32_t seed) {
+  Random random(seed);
+  const auto vector = [&](float size) {
+    return DVec3(random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size));
+  };
+  Mesh mesh;
+  for (uint32_t i = 0; i < count; ++i) {
+    const DVec3 root = vector(0.5f), along = vector(1.0f), bend = vector(0.15f);
+    const DVec3 side = 0.03 * glm::normalize(glm::cross(along, vector(1.0f)));
+    const DVec3 up = 0.2 * glm::cross(side, glm::normalize(along));
+    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    for (uint32_t row = 0; row <= steps; ++row) {
+      const double t = static_cast<double>(row) / steps;
+      const DVec3 middle = root + t * along + t * t * bend;
+      if (row == steps) mesh.positions.push_back(Vec3(middle));
+      for (int corner = -1; corner <= 1 && row < steps; ++corner)
+        mesh.positions.push_back(
+            Vec3(middle + (1.0 - t) * (static_cast<double>(corner) * side + (corner == 0 ? up : DVec3(0.0)))));
+    }
+    for (uint32_t row = 0; row < steps; ++row)
+      for (uint32_t a = first + 3 * row; a < first + 3 * row + 2; ++a) {
+        const uint32_t next = row + 1 == steps ? first + 3 * steps : a + 3;
+        mesh.triangles.emplace_back(a, a + 1, next);
+        if (row + 1 < steps) mesh.triangles.emplace_back(a + 1, next + 1, next);
+      }
+  }
+  return mesh;
+}
+
 Mesh sponge_mesh(uint32_t depth) {
   int side = 1;
   for (uint32_t i = 0; i < depth; ++i) side *= 3;
@@ -294,6 +323,7 @@ std::vector<ClassMesh> class_meshes() {
       {"tunnels", "sponge", tunnels},
       {"washer", "open", washer},
       {"fans", "open", fans},
+      {"fins", "open", [] { return fins_mesh(400, 40, 7); }},
       {"boulder", "organic", boulder},
       {"torus", "organic", [] { return torus_mesh(200, 120); }},
   };

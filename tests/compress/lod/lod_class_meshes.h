@@ -24,6 +24,9 @@ Mesh plate_mesh(uint32_t cells, double thickness, double bend);
 /// Closed strands of equal radius that grow from the unit square and curl.
 Mesh strands_mesh(uint32_t count, uint32_t steps, uint32_t sides, double radius, uint32_t seed);
 
+/// Open fins of two thin sides, which taper to a point, bend and cross each other.
+Mesh fins_mesh(uint32_t count, uint32_t steps, uint32_t seed);
+
 /// A Menger sponge of 20^depth cubes. Each square of its surface is two triangles.
 Mesh sponge_mesh(uint32_t depth);
 

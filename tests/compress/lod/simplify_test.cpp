@@ -119,6 +119,17 @@ double farthest_from(const std::vector<DVec3>& points, const SimplifyMesh& mesh)
   return farthest;
 }
 
+/// No plane of a thin part's triangles keeps its tip from receding along it.
+TEST(Simplify, TipsOfThinPartsStay) {
+  constexpr uint32_t kFins = 60, kSteps = 20;
+  SimplifyMesh mesh = whole_number_mesh(fins_mesh(kFins, kSteps, 7), 1e4);
+  std::vector<DVec3> tips;
+  for (uint32_t i = 1; i <= kFins; ++i) tips.push_back(mesh.points[i * (3 * kSteps + 1) - 1]);
+  simplify(mesh, to(kFins * 10));
+  EXPECT_LE(mesh.triangles.size(), kFins * 10);
+  EXPECT_LE(farthest_from(tips, mesh), 350.0); // 3.5 % of a long fin; 528 where tips recede
+}
+
 /// The sides of a polygon, made of triangles with collinear corners.
 TEST(Simplify, LinesOfThreePointsKeepTheirShape) {
   constexpr uint32_t kSides = 16, kCut = 8;
