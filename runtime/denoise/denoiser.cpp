@@ -68,8 +68,9 @@ const DenoisedAo& AoDenoiser::denoise(bool with_variance) { return pipeline_->de
 std::vector<std::byte> AoDenoiser::save() const { return pipeline_->save(); }
 
 void AoDenoiser::restore(ImageSize size, std::span<const std::byte> bytes) {
-  size_ = size;
+  size_ = {}; // until the buffers have this size
   pipeline_->restore(size, bytes);
+  size_ = size;
 }
 
 void AoDenoiser::reset() { pipeline_->reset(); }

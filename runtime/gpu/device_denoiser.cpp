@@ -78,6 +78,10 @@ struct DeviceDenoiser::State {
   uint64_t pixels() const { return uint64_t{width} * height; }
   void dispatch(const char* name, Kernel& kernel, const DenoiseRecord& terms, uint32_t tile_height, uint32_t bytes);
   std::vector<DenoiserDispatch> run();
+  void release();
+  void allocate(uint32_t new_width, uint32_t new_height);
+  /// Forgets the commands of a call that threw.
+  void forget() { commands = Commands(), dispatches.clear(); }
   void upload(const DenoiseRecord& terms, const DenoiserFrame& frame);
   void find_changes(const DenoiseRecord& terms);
   void bind(Kernel& kernel, std::initializer_list<const Buffer*> buffers) {
@@ -107,28 +111,44 @@ DeviceDenoiser::~DeviceDenoiser() = default;
 
 void DeviceDenoiser::resize(uint32_t width, uint32_t height) {
   State& s = *state_;
-  s.width = width, s.height = height, s.now = 0;
-  const uint64_t n = s.pixels();
+  s.release(); // before the new buffers need its memory
+  try {
+    s.allocate(width, height);
+  } catch (...) {
+    s.release();
+    throw;
+  }
+}
+
+void DeviceDenoiser::State::release() {
+  width = height = now = 0;
+  for (StagedBuffer* buffer : {&view_z, &normal, &instance, &motion, &previous_z, &limits, &ao, &result})
+    *buffer = StagedBuffer();
+  past = {}, noisy = {};
+  for (Buffer* buffer : {&samples, &pair_guides, &changes}) *buffer = Buffer();
+}
+
+void DeviceDenoiser::State::allocate(uint32_t new_width, uint32_t new_height) {
+  width = new_width, height = new_height;
+  const uint64_t n = pixels();
   const auto staged = [&](StagedBuffer& buffer, uint64_t bytes, const char* what) {
-    buffer = StagedBuffer();
-    buffer = StagedBuffer(s.device, bytes, what);
+    buffer = StagedBuffer(device, bytes, what);
   };
-  staged(s.view_z, 4 * n, "depths"), staged(s.normal, 12 * n, "normals"), staged(s.instance, 4 * n, "instances");
-  staged(s.motion, 8 * n, "motion"), staged(s.previous_z, 4 * n, "previous depths");
-  staged(s.limits, 4 * n, "limits of histories"), staged(s.ao, 4 * n, "samples");
-  staged(s.result, 3 * kResultBytes * n, "the denoiser's result");
+  staged(view_z, 4 * n, "depths"), staged(normal, 12 * n, "normals"), staged(instance, 4 * n, "instances");
+  staged(motion, 8 * n, "motion"), staged(previous_z, 4 * n, "previous depths");
+  staged(limits, 4 * n, "limits of histories"), staged(ao, 4 * n, "samples");
+  staged(result, 3 * kResultBytes * n, "the denoiser's result");
   const auto on_device = [&](Buffer& buffer, uint64_t bytes, const char* what) {
     buffer = Buffer();
-    buffer = Buffer(s.device, bytes, BufferPlace::kDevice, what);
+    buffer = Buffer(device, bytes, BufferPlace::kDevice, what);
   };
-  for (Past& past : s.past) {
+  for (Past& past : past) {
     on_device(past.guides, kGuideBytes * n, "guides"), on_device(past.history, kHistoryBytes * n, "the history");
     on_device(past.trend, kTrendBytes * n, "trends");
   }
-  on_device(s.samples, kSampleBytes * n, "changes of samples"),
-      on_device(s.pair_guides, kPairBytes * n, "guide weights");
-  on_device(s.changes, 8, "flags");
-  for (Buffer& buffer : s.noisy) on_device(buffer, kNoisyBytes * n, "the filter's values");
+  on_device(samples, kSampleBytes * n, "changes of samples"), on_device(pair_guides, kPairBytes * n, "guide weights");
+  on_device(changes, 8, "flags");
+  for (Buffer& buffer : noisy) on_device(buffer, kNoisyBytes * n, "the filter's values");
 }
 
 /// @param bytes DenoiserDispatch::bytes_per_pixel
@@ -173,16 +193,16 @@ void DeviceDenoiser::State::find_changes(const DenoiseRecord& terms) {
   if (first || (!follows && (terms.flags & kKeepGuides) == 0)) commands.fill(changes, 1, 1, 1);
   if (first || !follows) return;
   bind(*compare,
-       {&view_z.device(), &normal.device(), &instance.device(), &motion.device(), &past[now ^ 1].guides, &changes});
+       {&view_z.device(), &normal.device(), &instance.device(), &motion.device(), &past[now].guides, &changes});
   dispatches.push_back({"compare", 0.0, 0}); // it ends early
   commands.dispatch(*compare, std::as_bytes(std::span(&terms, 1)), std::min(groups(width * height, 256), 1024u), 1);
 }
 
 std::vector<DenoiserDispatch> DeviceDenoiser::add(const DenoiseRecord& terms, const DenoiserFrame& frame) {
   State& s = *state_;
-  const bool follows = (terms.flags & kFollowMotion) != 0;
-  if (follows) s.now ^= 1;
-  const Past &before = s.past[follows ? s.now ^ 1 : s.now], &now = s.past[s.now];
+  s.forget();
+  const uint32_t next = (terms.flags & kFollowMotion) != 0 ? s.now ^ 1 : s.now;
+  const Past &before = s.past[s.now], &now = s.past[next];
   s.upload(terms, frame);
   s.find_changes(terms);
   s.bind(*s.history,
@@ -195,11 +215,14 @@ std::vector<DenoiserDispatch> DeviceDenoiser::add(const DenoiseRecord& terms, co
     s.bind(*s.correct, {&s.samples, &now.history, &now.trend});
     s.dispatch("correct", *s.correct, terms, kTileHeight, kSampleBytes);
   }
-  return s.run();
+  std::vector<DenoiserDispatch> times = s.run();
+  s.now = next;
+  return times;
 }
 
 std::vector<DenoiserDispatch> DeviceDenoiser::filter(const DenoiseRecord& terms, const DenoiserResult& result) {
   State& s = *state_;
+  s.forget();
   const Past& now = s.past[s.now];
   s.bind(*s.guides, {&now.guides, &s.changes, &s.pair_guides});
   s.dispatch("guides", *s.guides, terms, kTileHeight, kGuideBytes + kPairBytes);

@@ -93,6 +93,7 @@ void GpuPipeline::set_terms(const GBuffer& gbuffer, const AoFrame& ao, HistorySo
 
 void GpuPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
   set_terms(gbuffer, ao, source);
+  has_frame_ = false; // A run that fails leaves part of a history.
   const size_t n = gbuffer.size.pixels();
   added_ = denoiser_.add(terms_, {gbuffer.view_z,
                                   {&gbuffer.normal[0].x, 3 * n},

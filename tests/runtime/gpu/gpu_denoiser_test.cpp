@@ -300,6 +300,10 @@ TEST_F(GpuDenoiserTest, LittleDeviceMemory) {
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded) << error.what();
     }
+  AoDenoiser enough({}, &config_);
+  enough.add_frame(wall(kSize), noise(kSize, 0.5f, 0));
+  EXPECT_THROW(denoiser.restore(kSize, enough.save()), Error);
+  EXPECT_THROW(denoiser.add_frame(wall(kSize), noise(kSize, 0.5f, 0)), Error) << "its buffers have not been made";
   EXPECT_EQ(denoiser.next_frame(wall({8, 8}), noise({8, 8}, 0.5f, 0)).ao.size(), 64u);
 }
 
