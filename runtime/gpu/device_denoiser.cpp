@@ -94,17 +94,21 @@ DeviceDenoiser::DeviceDenoiser(const GpuConfig& device, const Passes& passes) : 
   State& s = *state_;
   s.device = Device::share(device);
   require_limits(*s.device);
-  const auto kernel = [&](std::span<const uint32_t> spirv, std::span<const uint32_t> constants, uint32_t bindings) {
+  const DeviceTraits& traits = s.device->traits();
+  const uint32_t exact = device.arithmetic == GpuArithmetic::kExact || !traits.fused_floats ? 1 : 0,
+                 fused = traits.fused_doubles ? 1 : 0;
+  /// @param constant of the kernel itself, after those of arithmetic.glsl
+  const auto kernel = [&](std::span<const uint32_t> spirv, uint32_t constant, uint32_t bindings) {
+    const uint32_t constants[] = {exact, fused, constant};
     return std::make_unique<Kernel>(s.device, spirv, constants, bindings, sizeof(DenoiseRecord));
   };
-  const uint32_t squarings[] = {passes.normal_squarings}, radius[] = {passes.window_radius};
-  s.compare = kernel(spirv::denoise_compare(), {}, 6);
-  s.history = kernel(spirv::denoise_history(), squarings, 15);
-  s.correct = kernel(spirv::denoise_correct(), radius, 3);
-  s.guides = kernel(spirv::denoise_guides(), {}, 3);
-  s.variance = kernel(spirv::denoise_variance(), {}, 7);
-  if (passes.filter_passes == 0) s.finish = kernel(spirv::denoise_finish(), {}, 3);
-  for (uint32_t i = 0; i < passes.filter_passes; ++i) s.filter_passes.push_back(kernel(pass_code(i), {}, 5));
+  s.compare = kernel(spirv::denoise_compare(), 0, 6);
+  s.history = kernel(spirv::denoise_history(), passes.normal_squarings, 15);
+  s.correct = kernel(spirv::denoise_correct(), passes.window_radius, 3);
+  s.guides = kernel(spirv::denoise_guides(), 0, 3);
+  s.variance = kernel(spirv::denoise_variance(), 0, 7);
+  if (passes.filter_passes == 0) s.finish = kernel(spirv::denoise_finish(), 0, 3);
+  for (uint32_t i = 0; i < passes.filter_passes; ++i) s.filter_passes.push_back(kernel(pass_code(i), 0, 5));
 }
 
 DeviceDenoiser::~DeviceDenoiser() = default;

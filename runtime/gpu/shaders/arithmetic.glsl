@@ -42,6 +42,23 @@ float divided(float a, float b) {
   return q;
 }
 
+// The square root of a number that is not negative.
+float rooted(float x) {
+  if (!(x > 0.0)) return 0.0;
+  if (kExactFloats) {
+    precise double root = sqrt(double(x));
+    return float(root);
+  }
+  precise float r = inversesqrt(x);
+  precise float g = x * r, h = 0.5 * r;
+  precise float error = fma(-h, g, 0.5);
+  g = fma(g, error, g);
+  h = fma(h, error, h);
+  precise float rest = fma(-g, g, x);
+  g = fma(rest, h, g);
+  return g;
+}
+
 // a b - cd with cd = c d already rounded, plus the rounding error of cd: the difference of two products with its sign.
 double double_difference(double a, double b, double c, double d) {
   precise double cd = c * d;

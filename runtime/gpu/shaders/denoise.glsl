@@ -1,4 +1,6 @@
 // What all passes of the denoiser share. The formulas are those of runtime/denoise/kernels/, in the same order.
+// Branches and thresholds decide as on the CPU, because all that leads to them is `precise`, quotient() or rooted().
+#include "arithmetic.glsl"
 #include "records.glsl"
 
 layout(push_constant) uniform Push { DenoiseRecord terms; };
@@ -16,8 +18,14 @@ bool inside(ivec2 p) { return all(greaterThanEqual(p, ivec2(0))) && all(lessThan
 uint index_of(ivec2 p) { return uint(p.y) * terms.width + uint(p.x); }
 uint pixel_count() { return terms.width * terms.height; }
 
+// Division by a positive number as on the CPU. Refining needs a normal divisor and a finite quotient.
+float quotient(float a, float b) {
+  float plain = a / b;
+  return kExactFloats || (b >= kSmallest && abs(plain) <= kLargest) ? divided(a, b) : plain;
+}
+
 // --- guides: disparity, normal x | y << 16, normal z, instance ---
-float disparity_of(float z) { return z >= kSmallest && z <= kLargest ? 1.0 / z : 0.0; }
+float disparity_of(float z) { return z >= kSmallest && z <= kLargest ? quotient(1.0, z) : 0.0; }
 int low_half(uint word) { return bitfieldExtract(int(word), 0, 16); }
 ivec3 normal_of(uint xy, uint z) { return ivec3(low_half(xy), int(xy) >> 16, low_half(z)); }
 int dot_of(ivec3 a, ivec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }

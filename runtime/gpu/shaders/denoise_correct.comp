@@ -4,7 +4,7 @@
 // runtime/denoise/kernels/history_rows_body.h.
 #include "denoise.glsl"
 
-layout(constant_id = 0) const uint kRadius = 4u; // of the window, at most 4
+layout(constant_id = 2) const uint kRadius = 4u; // of the window, at most 4
 
 // Shared memory limits how many groups run at once, so they have many threads.
 layout(local_size_x = 32, local_size_y = 16) in;
@@ -48,7 +48,7 @@ void sum_rows() {
 
 // Reduces the magnitude of a change by a limit, at most to 0.
 float excess(float change, float limit) {
-  float left = greater(abs(change) - limit, 0.0);
+  precise float left = greater(abs(change) - limit, 0.0);
   return change < 0.0 ? -left : left;
 }
 
@@ -64,22 +64,26 @@ void correct(ivec2 p, uint at) {
     if (r + 1u >= kRadius && r <= kRadius + 1u) narrow_count += float(counts >> 16), narrow_change += sums.w;
   }
   float n = greater(count, 1.0);
-  precise float spread = squares - value * (value / n);
-  float variance = count > 1.0 ? greater(spread, 0.0) / greater(n - 1.0, 1.0) : 0.0;
-  float noise = variance * terms.fast_share, narrow_n = greater(narrow_count, 1.0);
-  precise float wide = excess(change / n, terms.gamma * sqrt(noise / n) + terms.change_tolerance);
-  precise float narrow = excess(narrow_change / narrow_n, terms.gamma * sqrt(noise / narrow_n) + terms.change_tolerance);
+  precise float mean = quotient(value, n);
+  precise float spread = squares - value * mean;
+  precise float variance = count > 1.0 ? quotient(greater(spread, 0.0), greater(n - 1.0, 1.0)) : 0.0;
+  precise float noise = variance * terms.fast_share;
+  float narrow_n = greater(narrow_count, 1.0);
+  precise float wide_limit = terms.gamma * rooted(quotient(noise, n)) + terms.change_tolerance;
+  precise float narrow_limit = terms.gamma * rooted(quotient(noise, narrow_n)) + terms.change_tolerance;
+  float wide = excess(quotient(change, n), wide_limit);
+  float narrow = excess(quotient(narrow_change, narrow_n), narrow_limit);
   float wanted = abs(narrow) > abs(wide) ? narrow : wide;
   if (wanted == 0.0) return;
 
   uint i = index_of(p);
   vec2 slow = history[i], rest = history[pixel_count() + i];
   float old_mean = slow.x;
-  float new_mean = slow.y > 0.0 ? lesser(greater(old_mean + wanted, 0.0), 1.0) : old_mean;
-  float shift = new_mean - old_mean;
+  precise float new_mean = slow.y > 0.0 ? lesser(greater(old_mean + wanted, 0.0), 1.0) : old_mean;
+  precise float shift = new_mean - old_mean;
   if (shift == 0.0) return;
-  float kept = 1.0 - lesser(terms.response * abs(shift), 1.0);
-  float frames = lesser(slow.y, greater(slow.y * kept, terms.fast_frames));
+  precise float kept = 1.0 - lesser(terms.response * abs(shift), 1.0);
+  precise float frames = lesser(slow.y, greater(slow.y * kept, terms.fast_frames));
   precise float moment = greater(rest.x - old_mean * old_mean, 0.0); // a shift keeps the variance
   precise float square = moment + new_mean * new_mean;
   history[i] = vec2(new_mean, frames);

@@ -4,7 +4,7 @@
 // interpolate_run(), sharpen_run(), accumulate_row() and keep_trends_row() of runtime/denoise/kernels/history_rows_body.h.
 #include "denoise.glsl"
 
-layout(constant_id = 0) const uint kSquarings = 2u; // that raise cosines to their power
+layout(constant_id = 2) const uint kSquarings = 2u; // that raise cosines to their power
 
 layout(local_size_x = 32, local_size_y = 8) in;
 layout(std430, binding = 0) readonly restrict buffer Depths { float view_z[]; };
@@ -53,22 +53,23 @@ struct Located {
 Located locate(ivec2 p, float now, vec2 motion, bool still) {
   Located l;
   vec2 from = vec2(p) - (still ? vec2(0.0) : motion);
-  float before = now;
+  precise float before = now;
   bool seen = now > 0.0;
   if (has(kHasPreviousZ)) {
     float z = previous_z[index_of(p)];
     seen = seen && z >= kSmallest && z <= kLargest;
-    before = 1.0 / lesser(greater(z, kSmallest), kLargest);
+    before = quotient(1.0, lesser(greater(z, kSmallest), kLargest));
   }
   l.found = from.x > -1.0 && from.x < float(terms.width) && from.y > -1.0 && from.y < float(terms.height) && seen;
   vec2 at = l.found ? from : vec2(0.0), whole = floor(at);
   l.corner = ivec2(whole);
   l.fraction = at - whole;
-  float slope = smaller_step(disparity_at(p - ivec2(1, 0)), now, disparity_at(p + ivec2(1, 0))) +
+  precise float slope = smaller_step(disparity_at(p - ivec2(1, 0)), now, disparity_at(p + ivec2(1, 0))) +
                 smaller_step(disparity_at(p - ivec2(0, 1)), now, disparity_at(p + ivec2(0, 1)));
-  if (has(kHasPreviousZ)) slope *= before / greater(now, kSmallest);
+  if (has(kHasPreviousZ)) slope *= quotient(before, greater(now, kSmallest));
   l.disparity = before;
-  l.tolerance = terms.depth * before + terms.slope * slope + kSmallest;
+  precise float tolerance = terms.depth * before + terms.slope * slope + kSmallest;
+  l.tolerance = tolerance;
   l.longest = still ? terms.longest_still : terms.longest_moving;
   return l;
 }
@@ -91,10 +92,11 @@ void gather(inout Gathered sum, ivec2 p, float bilinear, Located l, uvec4 guide,
   bool same = there > 0.0 && past.frames > 0.0 && away <= 2.0 * l.tolerance &&
               (!has(kTestInstances) || other.w == guide.w);
   if (!same) return;
-  precise float part = bilinear * (l.tolerance / greater(away, l.tolerance) * cosine);
+  precise float part = bilinear * (quotient(l.tolerance, greater(away, l.tolerance)) * cosine);
+  precise float weight = sum.weight + part;
   precise float mean = sum.mean + part * past.mean, square = sum.square + part * past.square;
   precise float fast = sum.fast + part * past.fast, frames = sum.frames + part * past.frames;
-  sum = Gathered(sum.weight + part, mean, square, fast, frames);
+  sum = Gathered(weight, mean, square, fast, frames);
 }
 
 // A pixel of the bicubic footprint; `same` becomes false if it is not on the surface.
@@ -141,13 +143,15 @@ Past resampled(ivec2 p, uvec4 guide, vec2 motion, bool still) {
   ivec3 normal = normal_of(guide.y, guide.z);
   float fx = l.fraction.x, fy = l.fraction.y;
   Gathered sum = Gathered(0.0, 0.0, 0.0, 0.0, 0.0);
-  gather(sum, l.corner, (1.0 - fx) * (1.0 - fy), l, guide, normal);
-  if (fx > 0.0) gather(sum, l.corner + ivec2(1, 0), fx * (1.0 - fy), l, guide, normal);
-  if (fy > 0.0) gather(sum, l.corner + ivec2(0, 1), (1.0 - fx) * fy, l, guide, normal);
-  if (fx > 0.0 && fy > 0.0) gather(sum, l.corner + ivec2(1, 1), fx * fy, l, guide, normal);
+  precise float w00 = (1.0 - fx) * (1.0 - fy), w10 = fx * (1.0 - fy), w01 = (1.0 - fx) * fy, w11 = fx * fy;
+  gather(sum, l.corner, w00, l, guide, normal);
+  if (fx > 0.0) gather(sum, l.corner + ivec2(1, 0), w10, l, guide, normal);
+  if (fy > 0.0) gather(sum, l.corner + ivec2(0, 1), w01, l, guide, normal);
+  if (fx > 0.0 && fy > 0.0) gather(sum, l.corner + ivec2(1, 1), w11, l, guide, normal);
   if (!(sum.weight > kMinHistoryWeight)) return Past(0.0, 0.0, 0.0, 0.0);
-  float scale = 1.0 / sum.weight;
-  Past past = Past(lesser(sum.mean * scale, 1.0), sum.square * scale, sum.fast * scale, lesser(sum.frames, l.longest));
+  float scale = quotient(1.0, sum.weight);
+  precise float mean = sum.mean * scale, mean_square = sum.square * scale, fast = sum.fast * scale;
+  Past past = Past(lesser(mean, 1.0), mean_square, fast, lesser(sum.frames, l.longest));
   if (fx + fy > 0.0 && sum.weight > kMinSharpenWeight) {
     float sharp = sharpened(past.mean, l, guide.w);
     precise float square = past.square + (sharp - past.mean) * (sharp + past.mean); // keeps the variance
@@ -202,7 +206,8 @@ void main() {
   bool valid = value >= 0.0 && value <= kLargest && uintBitsToFloat(guide.x) > 0.0;
   value = valid ? lesser(value, 1.0) : 0.0;
   float count = lesser(past.frames + 1.0, terms.longest);
-  float share = valid ? 1.0 / count : 0.0, fast_share = valid ? 1.0 / lesser(count, terms.fast_frames) : 0.0;
+  float share = valid ? quotient(1.0, count) : 0.0;
+  float fast_share = valid ? quotient(1.0, lesser(count, terms.fast_frames)) : 0.0;
   precise float mean = past.mean + (value - past.mean) * share;
   precise float fast = past.fast + (value - past.fast) * fast_share;
   precise float square = past.square + (value * value - past.square) * share;
@@ -212,5 +217,6 @@ void main() {
   history_now[i] = vec2(mean, frames);
   history_now[pixel_count() + i] = vec2(square, fast);
   trend_now[i] = trend;
-  samples[i] = vec2(valid ? value : -1.0, valid ? fast - mean : 0.0);
+  precise float change = fast - mean;
+  samples[i] = vec2(valid ? value : -1.0, valid ? change : 0.0);
 }

@@ -30,7 +30,8 @@ void load_moments(ivec2 origin) {
     float a = slow.x, n = slow.y;
     if (!(n > 0.0)) continue;
     precise float square = a * a;
-    precise float spread = greater(history[pixel_count() + at].x - square, 0.0) * n / greater(n - 1.0, 1.0);
+    precise float scaled = greater(history[pixel_count() + at].x - square, 0.0) * n;
+    float spread = quotient(scaled, greater(n - 1.0, 1.0));
     float decay = uintBitsToFloat(trend[at] & 0xffff0000u);
     s_counts[i] = 1u + (n >= 2.0 ? 1u << 8 : 0u) + (decay > 0.0 ? 1u << 16 : 0u);
     s_moments[i] = vec4(a, square, n >= 2.0 ? spread : 0.0, decay > 0.0 ? decay : 0.0);
@@ -56,9 +57,10 @@ float log2_of(float x) {
   return log;
 }
 float exp2_of(float x) { // of x in [-100, 0]
-  float whole = float(int(x) - 1), f = x - whole;
+  precise float whole = float(int(x) - 1), f = x - whole;
   precise float m = 1.0 + f * (0.6951786 + f * (0.2276186 + f * 0.0772028));
-  return m * intBitsToFloat((int(whole) + 127) << 23);
+  precise float scaled = m * intBitsToFloat((int(whole) + 127) << 23);
+  return scaled;
 }
 
 struct Variance {
@@ -70,22 +72,25 @@ Variance variance_of(vec2 slow, float mean_square, uint counts, vec4 sums, bool 
   float a = slow.x, n = greater(slow.y, 1.0);
   float count = greater(float(counts & 255u), 1.0);
   float spread_seen = float((counts >> 8) & 255u), decay_seen = float(counts >> 16);
-  precise float space = greater(sums.y * count - sums.x * sums.x, 0.0) / (count * greater(count - 1.0, 1.0));
+  precise float above = greater(sums.y * count - sums.x * sums.x, 0.0), below = count * greater(count - 1.0, 1.0);
+  float space = quotient(above, below);
   precise float own = greater(mean_square - a * a, 0.0) * n;
   // The mean of the variance around, with weight prior, and the pixel's own.
   float around = spread_seen > 0.0 ? sums.z : space, divisor = greater(spread_seen, 1.0);
-  precise float both = (terms.prior * around + own * divisor) / ((terms.prior + n - 1.0) * divisor);
-  float spread = n < 2.0 ? space : both;
+  above = terms.prior * around + own * divisor, below = (terms.prior + n - 1.0) * divisor;
+  float both = quotient(above, below);
+  precise float spread = n < 2.0 ? space : both;
   spread = moves && n < 4.0 ? greater(spread, 0.5 * space) : spread;
-  float mean = sums.x / count;
+  float mean = quotient(sums.x, count);
   if (terms.per_sample < 1.0) spread = lesser(spread, mean * (1.0 - mean) * terms.most_spread);
   precise float measured = terms.ratio_prior * terms.still_factor * spread + sums.w;
-  float factor = has(kStratified) && spread > 0.0 ? measured / ((terms.ratio_prior + decay_seen) * spread)
-                                                  : terms.still_factor;
-  precise float still = factor * exp2_of(-terms.still_power * log2_of(n));
+  precise float modelled = (terms.ratio_prior + decay_seen) * spread;
+  float factor = has(kStratified) && spread > 0.0 ? quotient(measured, modelled) : terms.still_factor;
+  precise float exponent = -terms.still_power * log2_of(n);
+  precise float still = factor * exp2_of(exponent);
   precise float moving = terms.moving_base + terms.moving_gain * n;
   float ratio = lesser(moves && n <= terms.longest_moving ? moving : still, 1.0);
-  precise float share = 1.0 / n, v = spread * (n < 2.0 ? 1.0 : ratio) * share;
+  precise float share = quotient(1.0, n), v = spread * (n < 2.0 ? 1.0 : ratio) * share;
   precise float sample_share = share * terms.per_sample;
   precise float told = v * (1.0 + sample_share * (terms.young + terms.distrust * sample_share));
   return slow.y > 0.0 ? Variance(v, told) : Variance(0.0, kMaxVariance * (1.0 + terms.distrust));
@@ -105,7 +110,8 @@ vec2 sum_of_neighbours(ivec2 p, uint step) {
       vec2 there = history_at(q);
       if (!(there.y > 0.0)) continue;
       uint weight = (pair_guides[step * pixel_count() + index_of(side == 0 ? p : q)] >> (8 * d)) & 255u;
-      if (weight > kLoneGuide) sum += vec2(float(weight), float(weight) * there.x);
+      precise float part = float(weight) * there.x;
+      if (weight > kLoneGuide) sum += vec2(float(weight), part);
     }
   return sum;
 }
@@ -120,7 +126,7 @@ float filled_value(ivec2 p) {
         vec2 there = history_at(p + ivec2(x, y));
         if (there.y > 0.0) sum += vec2(1.0, there.x);
       }
-  return sum.x > 0.0 ? sum.y / sum.x : 1.0;
+  return sum.x > 0.0 ? quotient(sum.y, sum.x) : 1.0;
 }
 
 void main() {
@@ -136,7 +142,8 @@ void main() {
   vec2 slow = history[i];
   bool moves = has(kHasHistory) && has(kFollowMotion) && changes[0] != 0u;
   Variance v = variance_of(slow, history[pixel_count() + i].x, counts, sums, moves);
-  precise float root = reciprocal_root(2.0 * terms.noise_tolerance * v.told + 1e-6);
+  precise float allowed = 2.0 * terms.noise_tolerance * v.told + 1e-6;
+  float root = reciprocal_root(allowed);
   precise float precision_units = lesser(greater(kPrecisionUnits * root + 0.5, 1.0), kMostPrecision);
   // Resampled histories belong to surfaces.
   bool hit = (has(kFollowMotion) && slow.y > 0.0) || uintBitsToFloat(guides[i].x) > 0.0;
