@@ -159,14 +159,22 @@ std::filesystem::path Document::uri_file(const Value& uri) const {
   const std::string name = decode_percent(uri.text());
   if (name.empty()) uri.fail("is empty");
   if (name.find("://") != std::string::npos) uri.fail("is not a file beside the document: " + in_quotes(name));
-  const std::filesystem::path path = (folder_ / name).lexically_normal();
-  if (!context_.options.allow_uris_outside_folder) {
-    std::error_code error;
-    const auto inside = std::filesystem::weakly_canonical(path, error)
-                            .lexically_relative(std::filesystem::weakly_canonical(folder_, error));
-    if (error || inside.empty() || *inside.begin() == "..")
-      uri.fail("leads out of the document's folder: " + in_quotes(name) + "; --allow-outside reads it");
+  if (name.find('\0') != std::string::npos) uri.fail("has a zero byte");
+  std::filesystem::path path = (folder_ / name).lexically_normal();
+  std::error_code error;
+  if (name.find('\\') != std::string::npos && !std::filesystem::exists(path, error)) {
+    std::string slashes = name;
+    std::ranges::replace(slashes, '\\', '/');
+    path = (folder_ / slashes).lexically_normal();
+    context_.feed.reporter().warning(place(), "file names have back-slashes, " + in_quotes(name) + "; read as slashes");
   }
+  if (context_.options.allow_uris_outside_folder) return path;
+  error.clear();
+  const std::filesystem::path folder = std::filesystem::weakly_canonical(folder_, error);
+  if (!error) path = std::filesystem::weakly_canonical(path, error);
+  const std::filesystem::path inside = path.lexically_relative(folder);
+  if (error || inside.empty() || *inside.begin() == "..")
+    uri.fail("leads out of the document's folder: " + in_quotes(name) + "; --allow-outside reads it");
   return path;
 }
 

@@ -35,8 +35,9 @@ public:
   /// Bytes of an image, which are read once. They live as long as the document.
   std::span<const std::byte> image_bytes(uint64_t image);
 
-  /// Path of the file that a URI names. Throws if it is not a relative path within the document's folder and files
-  /// outside are not allowed.
+  /// Path of the file that a URI names. Back-slashes are read as slashes, with a warning, if no file has the name as
+  /// written. Throws if the file is not within the document's folder and files outside are not allowed; otherwise links
+  /// in the path are resolved.
   std::filesystem::path uri_file(const Value& uri) const;
 
   uint32_t file_number() const { return file_number_; }

@@ -53,7 +53,11 @@ void Materials::warn(const std::string& text) { document_.context().feed.reporte
 std::string Materials::image_file(uint64_t number) {
   const Value image = document_.element("images", number);
   const std::optional<Value> uri = image.find("uri");
-  if (uri && !uri->text().starts_with("data:")) return document_.uri_file(*uri).string();
+  if (uri && !uri->text().starts_with("data:")) {
+    const std::filesystem::path path = document_.uri_file(*uri);
+    file_names_.accept(path);
+    return path.string();
+  }
   const std::string name =
       "image " + std::to_string(number) + " of glTF file " + std::to_string(document_.file_number());
   file_names_.embed(name, document_.image_bytes(number));

@@ -39,6 +39,10 @@ std::filesystem::path FileNames::resolve(std::string_view raw, const Place& plac
     return {};
   }
   if (embedded_.contains(name)) return name;
+  if (accepted_.contains(name)) {
+    named_.insert(name);
+    return name;
+  }
   std::filesystem::path path = (folder_ / name).lexically_normal();
   if (raw.find('\\') != std::string_view::npos && !file_exists(path)) {
     // The backslashes are literal separators: "textures\brick.png" does not contain a backspace.

@@ -33,6 +33,9 @@ public:
   /// Records a file that the scene names but the import does not read.
   void mention(std::string_view raw);
 
+  /// Makes resolve() return a path as it is, back-slashes included, for files that were checked before.
+  void accept(const std::filesystem::path& path) { accepted_.insert(path.string()); }
+
   /// Makes bytes known as a file of this name, for images within glTF files. A name that is in use is replaced.
   /// @param bytes must live as long as this object
   void embed(const std::string& name, std::span<const std::byte> bytes) { embedded_[name] = bytes; }
@@ -49,7 +52,7 @@ public:
 private:
   std::filesystem::path folder_;
   bool allow_outside_;
-  std::unordered_set<std::string> named_;
+  std::unordered_set<std::string> named_, accepted_;
   std::unordered_map<std::string, std::span<const std::byte>> embedded_;
 };
 

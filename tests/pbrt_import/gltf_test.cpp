@@ -402,6 +402,49 @@ TEST(GltfProblems, FilesOutsideTheFolderAreRefused) {
   EXPECT_FALSE(import_with("link.bin", true).reported("leads out"));
 }
 
+/// Images are read by the importer of pbrt files, which reads back-slashes as slashes.
+TEST(GltfProblems, ImagesOutsideTheFolderAreRefused) {
+  const SceneFolder folder;
+  GltfBuilder gltf;
+  gltf.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  gltf.json["textures"] = {{{"source", 0}}};
+  const Json primitive = {{"attributes",
+                           {{"POSITION", gltf.positions(kSquare)},
+                            {"TEXCOORD_0", gltf.accessor<float>("VEC2", 5126, {0, 0, 1, 0, 1, 1, 0, 1})}}},
+                          {"indices", gltf.accessor<uint16_t>("SCALAR", 5123, {0, 1, 2, 0, 2, 3})},
+                          {"material", 0}};
+  GltfBuilder document = with_primitive(primitive, gltf);
+  folder.write("secret.png", std::string(good_png()));
+  folder.write("inner/images/own.png", std::string(good_png()));
+  std::filesystem::create_symlink(folder.path() / "secret.png", folder.path() / "inner/link.png");
+  const auto import_with = [&](const std::string& uri, bool allow) {
+    document.json["images"] = {{{"uri", uri}}};
+    ImportOptions options;
+    options.keep_textures = true;
+    options.allow_uris_outside_folder = allow;
+    return import_file(folder.write("inner/a.gltf", document.text()), options);
+  };
+  const uint64_t files = import_with("none.png", false).statistics.files_read;
+  for (const std::string& uri :
+       {std::string("../secret.png"), std::string("..\\secret.png"), std::string("..%5Csecret.png"),
+        std::string("%2e%2e%5csecret.png"), std::string("%2e%2e/secret.png"), std::string("images\\..\\..\\secret.png"),
+        std::string("link.png"), (folder.path() / "secret.png").string()}) {
+    const Imported refused = import_with(uri, false);
+    EXPECT_TRUE(refused.reported("leads out of the document's folder")) << uri << "\n" << refused.text();
+    EXPECT_EQ(refused.statistics.files_read, files) << uri;
+    const Imported allowed = import_with(uri, true);
+    EXPECT_FALSE(allowed.reported("leads out")) << uri << "\n" << allowed.text();
+    EXPECT_EQ(allowed.statistics.files_read, files + 1) << uri;
+  }
+  EXPECT_EQ(import_with("images/own.png", false).statistics.files_read, files + 1);
+  const Imported windows = import_with("images\\own.png", false);
+  EXPECT_EQ(windows.statistics.files_read, files + 1);
+  EXPECT_TRUE(windows.reported("back-slashes")) << windows.text();
+  folder.write("inner/a\\b.png", std::string(good_png()));
+  EXPECT_EQ(import_with("a\\b.png", false).statistics.files_read, files + 1);
+  EXPECT_TRUE(import_with("own.png%00", false).reported("has a zero byte"));
+}
+
 TEST(GltfProblems, MemoryIsLimited) {
   const SceneFolder folder;
   GltfBuilder gltf;
