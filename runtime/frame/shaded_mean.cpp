@@ -30,20 +30,35 @@ void for_each_row(uint32_t height, const Work& work) {
   });
 }
 
-/// Mean and standard deviation per colour of the 3 x 3 pixels around one.
+/// Mean and variance per colour of the 7 x 7 pixels around one.
 struct LocalRange {
-  Vec3 mean{0.0f}, deviation{0.0f};
+  Vec3 mean{0.0f}, variance{0.0f};
 };
 LocalRange local_range(std::span<const Vec3> values, ImageSize size, uint32_t x, uint32_t y) {
+  constexpr uint32_t kReach = 3;
   Vec3 sum(0.0f), squares(0.0f);
   float count = 0.0f;
-  for (uint32_t j = std::max(y, 1u) - 1; j <= std::min(y + 1, size.height - 1); ++j)
-    for (uint32_t i = std::max(x, 1u) - 1; i <= std::min(x + 1, size.width - 1); ++i) {
+  for (uint32_t j = std::max(y, kReach) - kReach; j <= std::min(y + kReach, size.height - 1); ++j)
+    for (uint32_t i = std::max(x, kReach) - kReach; i <= std::min(x + kReach, size.width - 1); ++i) {
       const Vec3 v = values[size_t{j} * size.width + i];
       sum += v, squares += v * v, count += 1.0f;
     }
   sum /= count;
-  return {sum, glm::sqrt(glm::max(squares / count - sum * sum, Vec3(0.0f)))};
+  return {sum, glm::max(squares / count - sum * sum, Vec3(0.0f))};
+}
+
+/// Moves the history of reflections into the range of the new frame around the pixel, where it lies farther away than
+/// noise explains. The noise is the larger of what the history and the new frame show: rare bright samples stay.
+void limit_specular(ShadedPixel& p, const ShadedFrame& frame, uint32_t x, uint32_t y) {
+  constexpr float kDeviations = 3.0f, kKnownNoise = 4.0f; // frames from which the history tells its noise
+  if (p.specular_frames < kKnownNoise) return;
+  if (p.specular == Vec3(0.0f) && frame.specular[size_t{y} * frame.size.width + x] == Vec3(0.0f)) return;
+  const LocalRange range = local_range(frame.specular, frame.size, x, y);
+  const float light = luminance(p.specular), noise = std::max(p.specular_square - light * light, 0.0f);
+  const Vec3 tolerance = kDeviations * glm::sqrt(glm::max(range.variance, Vec3(noise)));
+  p.specular = glm::clamp(p.specular, range.mean - tolerance, range.mean + tolerance);
+  const float limited = luminance(p.specular);
+  p.specular_square = noise + limited * limited;
 }
 
 void add_to(Vec3& mean, float& square, float& frames, float longest, Vec3 value) {
@@ -109,10 +124,7 @@ void ShadedMean::add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHis
       const size_t i = size_t{y} * frame.size.width + x;
       ShadedPixel& p = pixels_[i];
       if (follows) p = resamples ? reprojected(gbuffer, i, static_cast<int>(x), static_cast<int>(y)) : ShadedPixel{};
-      if (follows && p.specular_frames > 0.0f) {
-        const LocalRange range = local_range(frame.specular, frame.size, x, y);
-        p.specular = glm::clamp(p.specular, range.mean - range.deviation, range.mean + range.deviation);
-      }
+      if (follows) limit_specular(p, frame, x, y);
       add_to(p.direct, p.direct_square, p.direct_frames, longest.direct, frame.direct[i]);
       add_to(p.specular, p.specular_square, p.specular_frames, longest.specular, frame.specular[i]);
       p.ambient_frames += 1.0f;

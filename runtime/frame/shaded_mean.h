@@ -40,8 +40,9 @@ public:
   /// Adds a frame of the same size as the others since clear(). Where something has moved, a pixel continues the means
   /// of the 2 x 2 pixels around the place where the frame before saw the same point (GBuffer::motion_px), as far as
   /// their instance, normal and depth agree. Direct light is taken relative to the albedo, so that textures stay sharp.
-  /// What is seen by reflection moves otherwise than the surface: its means follow for fewer frames, and within the
-  /// range of the new frame's 3 x 3 pixels. The ambient light has no noise and begins anew.
+  /// What is seen by reflection moves otherwise than the surface: its means follow for fewer frames, and within three
+  /// standard deviations of the noise around the mean of the new frame's 7 x 7 pixels. The ambient light has no noise
+  /// and begins anew.
   /// @param gbuffer of the frame, of which motion is read
   void add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history);
 

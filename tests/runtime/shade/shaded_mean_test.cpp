@@ -1,0 +1,72 @@
+// Means of shaded frames along motion, with samples of known means.
+
+#include <algorithm>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "runtime/frame/shaded_mean.h"
+
+namespace packtrace {
+namespace {
+
+constexpr ImageSize kWallSize{64, 48};
+
+/// A wall that fills the picture and moves over it.
+GBuffer wall(Vec2 motion = Vec2(0.0f), Vec3 albedo = Vec3(0.5f)) {
+  GBuffer g;
+  g.resize(kWallSize);
+  std::ranges::fill(g.view_z, 5.0f);
+  std::ranges::fill(g.normal, Vec3(0, 0, -1));
+  std::ranges::fill(g.albedo, albedo);
+  std::ranges::fill(g.instance, 0u);
+  std::ranges::fill(g.motion_px, motion);
+  return g;
+}
+
+ShadedFrame frame_of(Vec3 direct, Vec3 specular) {
+  const size_t n = kWallSize.pixels();
+  return {kWallSize, std::vector<Vec3>(n, direct), std::vector<Vec3>(n, specular), std::vector<Vec3>(n, Vec3(0.25f))};
+}
+
+double mean_specular(const ShadedMean& mean) {
+  double sum = 0.0;
+  for (const ShadedPixel& p : mean.pixels()) sum += double{p.specular.y};
+  return sum / static_cast<double>(kWallSize.pixels());
+}
+
+TEST(ShadedMean, RareReflectionsKeepTheirEnergyInMotion) {
+  for (const float chance : {0.02f, 0.1f, 0.5f}) {
+    ShadedMean mean;
+    std::mt19937 random(5);
+    std::bernoulli_distribution seen(double{chance});
+    double followed = 0.0;
+    constexpr int kFrames = 64, kSettled = 16;
+    for (int i = 0; i < kFrames; ++i) {
+      ShadedFrame frame = frame_of(Vec3(0.0f), Vec3(0.0f));
+      for (Vec3& value : frame.specular) value = Vec3(seen(random) ? 1.0f / chance : 0.0f);
+      const GBuffer g = wall(Vec2(0.3f, 0.2f));
+      mean.add(frame, g, i == 0 ? ShadedHistory::kNone : ShadedHistory::kMotion);
+      mean.keep_surfaces(g);
+      if (i >= kSettled) followed += mean_specular(mean) / (kFrames - kSettled);
+    }
+    EXPECT_NEAR(followed, 1.0, 0.05) << chance;
+  }
+}
+
+TEST(ShadedMean, ReflectionsThatLeaveAreForgotten) {
+  ShadedMean mean;
+  const GBuffer g = wall(Vec2(0.3f, 0.2f));
+  for (int i = 0; i < 16; ++i) {
+    mean.add(frame_of(Vec3(0.0f), Vec3(1.0f)), g, i == 0 ? ShadedHistory::kNone : ShadedHistory::kMotion);
+    mean.keep_surfaces(g);
+  }
+  // Pixels at the border have short histories, which are not limited.
+  const size_t middle = kWallSize.pixels() / 2 + kWallSize.width / 2;
+  EXPECT_NEAR(mean.pixels()[middle].specular.y, 1.0f, 1e-4f);
+  mean.add(frame_of(Vec3(0.0f), Vec3(0.1f)), g, ShadedHistory::kMotion);
+  EXPECT_NEAR(mean.pixels()[middle].specular.y, 0.1f, 0.01f);
+}
+
+} // namespace
+} // namespace packtrace
