@@ -104,12 +104,17 @@ Vec3 TexturePyramids::mean(uint32_t texture, Vec2 uv, Vec2 side_a, Vec2 side_b) 
   const Pyramid& pyramid = pyramids_[texture];
   const TextureView& full = pyramid.full;
   const Vec2 texels = full.uv_scale * Vec2(static_cast<float>(full.width), static_cast<float>(full.height));
-  const float a = glm::length(side_a * texels), b = glm::length(side_b * texels);
-  const float longer = std::max(a, b);
+  // The axes of the footprint are those of the ellipse that the sides, as columns of a matrix, make of the unit circle.
+  const Vec2 a = side_a * texels, b = side_b * texels;
+  const float aa = glm::dot(a, a), bb = glm::dot(b, b), ab = glm::dot(a, b);
+  const float longer = std::sqrt(0.5f * (aa + bb + std::hypot(aa - bb, 2.0f * ab)));
   if (!(longer > 1.0f) || !std::isfinite(longer)) return full.sample(uv);
-  const Vec2 along = a >= b ? side_a : side_b;
-  const float shorter = std::clamp(std::min(a, b), 1.0f, longer);
-  const int probes = std::clamp(static_cast<int>(std::ceil(longer / shorter - 0.5f)), 1, kMaxProbes);
+  const float angle = 0.5f * std::atan2(2.0f * ab, aa - bb);
+  const Vec2 along = std::cos(angle) * side_a + std::sin(angle) * side_b;
+  const float shorter = std::clamp(std::abs(a.x * b.y - a.y * b.x) / longer, 1.0f, longer);
+  constexpr float kRounding = 1e-3f; // of the ratio, so that footprints as wide as long take one sample
+  const float samples = std::ceil(longer / shorter - kRounding);
+  const int probes = static_cast<int>(std::clamp(samples, 1.0f, static_cast<float>(kMaxProbes)));
   const float texel = std::max(shorter, longer / static_cast<float>(probes));
   const float last = static_cast<float>(pyramid.levels.size() - 1);
   const float level = std::clamp(std::log2(texel), 0.0f, last);

@@ -16,8 +16,8 @@ public:
   explicit TexturePyramids(const SceneSource& source);
 
   /// Mean of a texture over a parallelogram of texture coordinates, linear sRGB: up to kMaxProbes samples along its
-  /// longer side, each interpolated within and between the two levels whose texels are about as large as the shorter
-  /// side. A parallelogram smaller than a texel gives TextureView::sample(). Source: Williams, Pyramidal Parametrics,
+  /// longer axis, each interpolated within and between the two levels whose texels are about as large as the shorter
+  /// axis. A parallelogram smaller than a texel gives TextureView::sample(). Source: Williams, Pyramidal Parametrics,
   /// SIGGRAPH 1983; McCormack et al., Feline: Fast Elliptical Lines for Anisotropic Texture Mapping, SIGGRAPH 1999.
   /// @param texture an index in Material::albedo_texture
   /// @param uv its middle

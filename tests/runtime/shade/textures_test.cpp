@@ -1,5 +1,6 @@
 // Textures of what camera rays and paths see, against pictures of many points per pixel.
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -83,6 +84,45 @@ TEST(TexturePyramid, WideFootprintsAreReadAlongTheirLongerSide) {
   EXPECT_NEAR(pyramids.mean(0, Vec2(28.5f / 64, 0.5f), narrow, wide).x, 1.0f, 1e-3f);
   EXPECT_NEAR(pyramids.mean(0, Vec2(28.5f / 64, 0.5f), wide, narrow).x, 1.0f, 1e-3f);
   EXPECT_NEAR(pyramids.mean(0, Vec2(32.0f / 64, 0.5f), narrow, wide).x, 0.5f, 1e-3f);
+}
+
+TEST(TexturePyramid, SlantedFootprintsAreReadAlongTheirLongerAxis) {
+  Scene scene;
+  AlbedoTexture stripes; // along the diagonal
+  stripes.width = stripes.height = 64;
+  for (uint32_t i = 0; i < 64 * 64; ++i)
+    for (int c = 0; c < 3; ++c) stripes.rgb.push_back((i % 64 + i / 64) % 16 < 8 ? 255 : 0);
+  add_textured_floor(scene, std::move(stripes), 1.0f);
+  const FloatSource source(scene);
+  const TexturePyramids pyramids(source);
+  constexpr int kPoints = 32;
+  float largest = 0.0f;
+  for (const float way : {1.0f, -1.0f}) { // along the stripes and across
+    const Vec2 a = Vec2(5.0f, 5.0f * way) / 64.0f, b = Vec2(4.0f, 3.0f * way) / 64.0f;
+    for (int place = 0; place < 16; ++place) {
+      const Vec2 uv = Vec2(32.0f + static_cast<float>(place), 32.0f) / 64.0f;
+      float truth = 0.0f;
+      for (int k = 0; k < kPoints * kPoints; ++k) {
+        const Vec2 at =
+            (Vec2(static_cast<float>(k % kPoints), static_cast<float>(k / kPoints)) + 0.5f) / float{kPoints} - 0.5f;
+        truth += source.texture(0).sample(uv + at.x * a + at.y * b).x / (kPoints * kPoints);
+      }
+      EXPECT_NEAR(pyramids.mean(0, uv, a, b).x, truth, 0.12f) << way << ", " << place;
+      largest = std::max(largest, truth);
+    }
+  }
+  EXPECT_GT(largest, 0.95f); // some footprints lie within a stripe
+}
+
+TEST(TexturePyramid, FootprintsOfAnyLengthHaveAMean) {
+  Scene scene;
+  add_textured_floor(scene, noise(16, 16), 1.0f);
+  const FloatSource source(scene);
+  const TexturePyramids pyramids(source);
+  for (const float length : {1e3f, 1e9f, 1e15f, 1e30f, INFINITY}) {
+    const Vec3 mean = pyramids.mean(0, Vec2(0.4f, 0.7f), Vec2(length, 0.0f), Vec2(0.0f, 1e-4f));
+    for (int c = 0; c < 3; ++c) EXPECT_TRUE(mean[c] >= 0.0f && mean[c] <= 1.0f) << length;
+  }
 }
 
 TEST(Textures, AreFilteredOverThePixel) {
