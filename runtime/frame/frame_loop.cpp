@@ -369,7 +369,12 @@ void FrameLoop::resolve_shading(std::span<const float> ao, RenderedImage& image)
   if (!config_.denoise) return packtrace::resolve_shading(config_, shaded_mean_.pixels(), ao, image);
   if (still_frames_ > 0) layers_.write_guides(gbuffer_, guides_);
   const GBuffer& mean = still_frames_ > 0 ? guides_ : gbuffer_;
-  const ShadedGuides guides{mean.size, mean.view_z, mean.normal, mean.instance, layers_.albedos(gbuffer_)};
+  const ShadedGuides guides{mean.size,
+                            mean.view_z,
+                            mean.normal,
+                            mean.instance,
+                            layers_.albedos(gbuffer_),
+                            static_cast<float>(still_frames_) + 1.0f};
   packtrace::resolve_shading(config_, shaded_mean_.denoised(guides), ao, image);
 }
 

@@ -13,10 +13,9 @@ namespace packtrace {
 namespace {
 
 constexpr int kPasses = 4;
-constexpr float kDark = 0.02f;       ///< least albedo that direct light is taken relative to
 constexpr float kLuminances = 3.0f;  ///< standard deviations by which neighbours may differ
 constexpr float kLongHistory = 4.0f; ///< frames from which a pixel's own samples tell its noise
-constexpr float kFading = 8.0f;      ///< frames from which the filter fades faster than the noise
+constexpr float kFading = 8.0f;      ///< still frames from which the filter fades faster than the noise
 
 /// One of the two signals of a pixel, with the variance of the luminance of its mean.
 struct Signal {
@@ -153,9 +152,10 @@ void filter_signal(const Grid& grid, std::span<const Guide> guides, std::span<co
   }
 }
 
-/// Variance of the mean of a history; less for long ones, whose noise is smaller than what the filter would blur.
-float variance_of_mean(Vec3 mean, float square, float frames) {
-  const float light = luminance(mean), fade = std::min(1.0f, kFading / frames);
+/// Variance of the mean of a history; less for long ones of a still view, whose noise is smaller than what the filter
+/// would blur.
+float variance_of_mean(Vec3 mean, float square, float frames, float still_frames) {
+  const float light = luminance(mean), fade = std::min(1.0f, kFading / std::min(frames, still_frames));
   return fade * fade * std::max(0.0f, square - light * light) / std::max(frames - 1.0f, 1.0f);
 }
 
@@ -167,11 +167,12 @@ void filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& g, 
   result.assign(pixels.begin(), pixels.end());
   std::vector<Signal> signals(pixels.size()), other;
   std::vector<float> frames(pixels.size());
-  const auto base = [&](size_t i) { return glm::max(g.albedo[i], Vec3(kDark)); };
+  const auto base = [&](size_t i) { return light_base(g.albedo[i]); };
   for (size_t i = 0; i < pixels.size(); ++i) {
     const ShadedPixel& p = pixels[i];
     const float scale = 1.0f / luminance(base(i));
-    signals[i] = {p.direct / base(i), variance_of_mean(p.direct, p.direct_square, p.direct_frames) * scale * scale};
+    signals[i] = {p.direct / base(i),
+                  variance_of_mean(p.direct, p.direct_square, p.direct_frames, g.still_frames) * scale * scale};
     frames[i] = p.direct_frames;
   }
   filter_signal(grid, guides, frames, signals, other);
@@ -179,7 +180,7 @@ void filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& g, 
     if (guides[i].instance != kNoInstance) result[i].direct = signals[i].colour * base(i);
   for (size_t i = 0; i < pixels.size(); ++i) {
     const ShadedPixel& p = pixels[i];
-    signals[i] = {p.specular, variance_of_mean(p.specular, p.specular_square, p.specular_frames)};
+    signals[i] = {p.specular, variance_of_mean(p.specular, p.specular_square, p.specular_frames, g.still_frames)};
     frames[i] = p.specular_frames;
   }
   filter_signal(grid, guides, frames, signals, other);

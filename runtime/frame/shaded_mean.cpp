@@ -1,8 +1,10 @@
 #include "runtime/frame/shaded_mean.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
+#include <optional>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -41,6 +43,7 @@ LocalRange local_range(std::span<const Vec3> values, ImageSize size, uint32_t x,
   for (uint32_t j = std::max(y, kReach) - kReach; j <= std::min(y + kReach, size.height - 1); ++j)
     for (uint32_t i = std::max(x, kReach) - kReach; i <= std::min(x + kReach, size.width - 1); ++i) {
       const Vec3 v = values[size_t{j} * size.width + i];
+      if (!is_finite(v)) continue;
       sum += v, squares += v * v, count += 1.0f;
     }
   sum /= count;
@@ -68,10 +71,16 @@ void add_to(Vec3& mean, float& square, float& frames, float longest, Vec3 value)
   square += (light * light - square) / frames;
 }
 
-/// Ratio of two albedos; black ones count as dark grey.
-Vec3 albedo_ratio(Vec3 now, Vec3 then) {
-  constexpr float kDark = 0.02f;
-  return glm::min((now + kDark) / (then + kDark), Vec3(8.0f));
+/// By what direct light that was seen on one albedo is multiplied to continue on another one; nothing if it tells too
+/// little: dark albedos hide the light, and large ratios enlarge the noise.
+std::optional<Vec3> albedo_ratio(Vec3 now, Vec3 then) {
+  constexpr float kLargest = 4.0f;
+  const Vec3 ratio = light_base(now) / light_base(then);
+  for (int c = 0; c < 3; ++c) {
+    if (!(ratio[c] <= kLargest && ratio[c] * kLargest >= 1.0f)) return std::nullopt;
+    if (then[c] < kDarkAlbedo && now[c] >= kDarkAlbedo) return std::nullopt;
+  }
+  return ratio;
 }
 
 } // namespace
@@ -94,14 +103,15 @@ ShadedPixel ShadedMean::reprojected(const GBuffer& g, size_t pixel, int x, int y
     const size_t at = static_cast<size_t>(j) * g.size.width + static_cast<size_t>(i);
     const Surface& then = surfaces_[at];
     const float weight = (right != 0 ? part.x : 1.0f - part.x) * (down != 0 ? part.y : 1.0f - part.y);
-    if (weight <= 0.0f || then.instance != g.instance[pixel]) continue;
+    if (weight <= 0.0f || then.instance != g.instance[pixel] || then.material != g.material[pixel]) continue;
     if (glm::dot(then.normal, g.normal[pixel]) < kLeastNormal) continue;
     if (std::abs(then.view_z - z) > kDepthTolerance * z) continue;
     const ShadedPixel& mean = before_[at];
-    const Vec3 ratio = albedo_ratio(g.albedo[pixel], then.albedo);
-    const float scale = luminance(ratio);
+    const std::optional<Vec3> ratio = albedo_ratio(g.albedo[pixel], then.albedo);
+    if (!ratio || !(mean.direct_frames > 0.0f)) continue;
+    const float scale = luminance(*ratio);
     weights += weight;
-    sum.direct += weight * ratio * mean.direct, sum.specular += weight * mean.specular;
+    sum.direct += weight * *ratio * mean.direct, sum.specular += weight * mean.specular;
     sum.direct_square += weight * scale * scale * mean.direct_square;
     sum.specular_square += weight * mean.specular_square;
     sum.direct_frames += weight * mean.direct_frames, sum.specular_frames += weight * mean.specular_frames;
@@ -112,25 +122,33 @@ ShadedPixel ShadedMean::reprojected(const GBuffer& g, size_t pixel, int x, int y
   return sum;
 }
 
-void ShadedMean::add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history) {
+uint64_t ShadedMean::add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history) {
   const bool follows = history == ShadedHistory::kMotion || history == ShadedHistory::kChanged;
   const size_t n = frame.size.pixels();
   if (pixels_.size() != n || history == ShadedHistory::kNone) pixels_.assign(n, {});
   const bool resamples = follows && surfaces_.size() == n;
   if (resamples) std::swap(pixels_, before_), pixels_.resize(n);
   const Longest longest = longest_of(history);
+  std::atomic<uint64_t> dropped = 0;
   for_each_row(frame.size.height, [&](uint32_t y) {
     for (uint32_t x = 0; x < frame.size.width; ++x) {
       const size_t i = size_t{y} * frame.size.width + x;
       ShadedPixel& p = pixels_[i];
       if (follows) p = resamples ? reprojected(gbuffer, i, static_cast<int>(x), static_cast<int>(y)) : ShadedPixel{};
+      if (is_finite(frame.ambient[i])) {
+        p.ambient_frames += 1.0f;
+        p.ambient += (frame.ambient[i] - p.ambient) / p.ambient_frames;
+      }
+      if (!is_finite(frame.direct[i]) || !is_finite(frame.specular[i])) {
+        dropped.fetch_add(1, std::memory_order_relaxed);
+        continue;
+      }
       if (follows) limit_specular(p, frame, x, y);
       add_to(p.direct, p.direct_square, p.direct_frames, longest.direct, frame.direct[i]);
       add_to(p.specular, p.specular_square, p.specular_frames, longest.specular, frame.specular[i]);
-      p.ambient_frames += 1.0f;
-      p.ambient += (frame.ambient[i] - p.ambient) / p.ambient_frames;
     }
   });
+  return dropped;
 }
 
 std::span<const ShadedPixel> ShadedMean::denoised(const ShadedGuides& guides) {
@@ -142,7 +160,7 @@ void ShadedMean::keep_surfaces(const GBuffer& g) {
   surfaces_.resize(g.size.pixels());
   for_each_row(g.size.height, [&](uint32_t y) {
     for (size_t i = size_t{y} * g.size.width, end = i + g.size.width; i < end; ++i)
-      surfaces_[i] = {g.view_z[i], g.instance[i], g.normal[i], g.albedo[i]};
+      surfaces_[i] = {g.view_z[i], g.instance[i], g.material[i], g.normal[i], g.albedo[i]};
   });
 }
 
@@ -180,7 +198,7 @@ bool ShadedMean::restore(size_t pixels, std::span<const std::byte> bytes) {
   if (bytes.size() != pixels * sizeof(ShadedPixel)) return false;
   pixels_.resize(pixels);
   std::memcpy(static_cast<void*>(pixels_.data()), bytes.data(), bytes.size());
-  return std::ranges::all_of(pixels_, [](const ShadedPixel& p) { return p.direct_frames >= 1.0f; });
+  return std::ranges::all_of(pixels_, [](const ShadedPixel& p) { return p.direct_frames >= 0.0f; });
 }
 
 } // namespace packtrace

@@ -39,12 +39,13 @@ public:
 
   /// Adds a frame of the same size as the others since clear(). Where something has moved, a pixel continues the means
   /// of the 2 x 2 pixels around the place where the frame before saw the same point (GBuffer::motion_px), as far as
-  /// their instance, normal and depth agree. Direct light is taken relative to the albedo, so that textures stay sharp.
-  /// What is seen by reflection moves otherwise than the surface: its means follow for fewer frames, and within three
-  /// standard deviations of the noise around the mean of the new frame's 7 x 7 pixels. The ambient light has no noise
-  /// and begins anew.
+  /// their instance, material, normal, depth and albedo agree. Direct light is taken relative to the albedo, so that
+  /// textures stay sharp. What is seen by reflection moves otherwise than the surface: its means follow for fewer
+  /// frames, and within three standard deviations of the noise around the mean of the new frame's 7 x 7 pixels. The
+  /// ambient light has no noise and begins anew. A pixel whose direct or specular light is not finite keeps its means.
   /// @param gbuffer of the frame, of which motion is read
-  void add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history);
+  /// @return number of these pixels
+  uint64_t add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history);
 
   std::span<const ShadedPixel> pixels() const { return pixels_; }
   /// pixels() without their noise: filter_shading(). Valid until the next add().
@@ -60,7 +61,7 @@ public:
 private:
   struct Surface {
     float view_z = 0.0f;
-    uint32_t instance = kNoInstance;
+    uint32_t instance = kNoInstance, material = 0;
     Vec3 normal{0.0f}, albedo{0.0f};
   };
   ShadedPixel reprojected(const GBuffer& gbuffer, size_t pixel, int x, int y) const;

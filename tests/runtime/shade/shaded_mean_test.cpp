@@ -68,5 +68,52 @@ TEST(ShadedMean, ReflectionsThatLeaveAreForgotten) {
   EXPECT_NEAR(mean.pixels()[middle].specular.y, 0.1f, 0.01f);
 }
 
+TEST(ShadedMean, LightThatMovesOntoOtherAlbedosKeepsItsMean) {
+  // Direct light of radiance 2 on an albedo that changes from frame to frame.
+  for (const auto& [first, second] :
+       {std::pair{0.0f, 0.5f}, {0.5f, 0.0f}, {0.01f, 0.9f}, {0.03f, 0.9f}, {0.4f, 0.5f}}) {
+    ShadedMean mean;
+    for (int i = 0; i < 9; ++i) {
+      const float albedo = i % 2 == 0 ? second : first;
+      const GBuffer g = wall(Vec2(0.3f, 0.2f), Vec3(albedo));
+      mean.add(frame_of(Vec3(2.0f * albedo), Vec3(0.0f)), g, i == 0 ? ShadedHistory::kNone : ShadedHistory::kMotion);
+      mean.keep_surfaces(g);
+    }
+    const ShadedPixel& p = mean.pixels()[kWallSize.pixels() / 2 + kWallSize.width / 2];
+    EXPECT_NEAR(p.direct.y, 2.0f * second, 1e-4f) << first << " to " << second;
+    EXPECT_GT(p.direct_frames, first == 0.4f ? 8.0f : 0.5f);
+  }
+}
+
+TEST(ShadedMean, OtherMaterialsOfAnInstanceBeginAnew) {
+  ShadedMean mean;
+  GBuffer g = wall(Vec2(0.3f, 0.2f));
+  mean.add(frame_of(Vec3(1.0f), Vec3(1.0f)), g, ShadedHistory::kNone);
+  mean.keep_surfaces(g);
+  std::ranges::fill(g.material, 1u);
+  mean.add(frame_of(Vec3(0.0f), Vec3(0.0f)), g, ShadedHistory::kMotion);
+  for (const ShadedPixel& p : mean.pixels()) EXPECT_EQ(p.direct + p.specular, Vec3(0.0f));
+}
+
+TEST(ShadedMean, SamplesThatAreNotFiniteAreDropped) {
+  for (const ShadedHistory history : {ShadedHistory::kSamePixels, ShadedHistory::kMotion}) {
+    ShadedMean mean;
+    const GBuffer g = wall();
+    for (int i = 0; i < 6; ++i) {
+      ShadedFrame frame = frame_of(Vec3(1.0f), Vec3(2.0f));
+      if (i % 2 == 0) frame.direct[100].x = NAN, frame.specular[200].y = INFINITY;
+      EXPECT_EQ(mean.add(frame, g, i == 0 ? ShadedHistory::kNone : history), i % 2 == 0 ? 2u : 0u);
+      mean.keep_surfaces(g);
+    }
+    for (const ShadedPixel& p : mean.pixels()) {
+      EXPECT_EQ(p.direct, Vec3(1.0f));
+      EXPECT_EQ(p.specular, Vec3(2.0f));
+      EXPECT_EQ(p.ambient, Vec3(0.25f));
+    }
+    ShadedMean restored;
+    EXPECT_TRUE(restored.restore(kWallSize.pixels(), mean.save()));
+  }
+}
+
 } // namespace
 } // namespace packtrace
