@@ -79,6 +79,21 @@ TEST(ShaderImage, FilteredBitsShowSoftShapes) {
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(image.texel(39, 39)[c], (Rgb8{255, 240, 10})[c], 5);
 }
 
+TEST(ShaderImage, BitsShowALittleInk) {
+  for (const bool inverse : {false, true}) {
+    const auto ink = [&](uint32_t x, uint32_t y) { return (x >= 20 && x < 30 && y >= 30 && y < 34) != inverse; };
+    const AlbedoTexture source = picture(64, 64, [&](uint32_t x, uint32_t y) { // 1 % differs
+      return ink(x, y) ? Rgb8{20, 10, 30} : Rgb8{250, 245, 240};
+    });
+    const ShaderImage image = encode_shader_image(source, TexelFormat::kBit);
+    EXPECT_GT(difference_of(image, source).psnr_db, 25.0); // without ink: 20
+    for (size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(image.texel(25, 32)[c], source.rgb[3 * (32 * 64 + 25) + c], 30);
+      EXPECT_NEAR(image.texel(5, 5)[c], source.rgb[3 * (5 * 64 + 5) + c], 10);
+    }
+  }
+}
+
 TEST(ShaderImage, EverySizeAndFormatIsEncodedTheSameTwice) {
   for (const auto& [w, h] : {std::pair{1u, 1u}, {1u, 9u}, {33u, 1u}, {31u, 3u}})
     for (const TexelFormat format : {TexelFormat::kBit, TexelFormat::kGrey, TexelFormat::kR2G4B2}) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace packtrace {
@@ -123,7 +124,8 @@ DVec3 color_at(const AlbedoTexture& source, size_t texel) {
   return {source.rgb[3 * texel], source.rgb[3 * texel + 1], source.rgb[3 * texel + 2]};
 }
 
-/// Two colours on the main axis of those of an image, where a twentieth of the texels lies beyond each.
+/// Two colours on the main axis of those of an image, where a twentieth of the texels lies beyond each. Where these are
+/// close, a twentieth would hide all that the image shows, and they are the outermost ones.
 std::array<DVec3, 2> first_keys(const AlbedoTexture& source, size_t count) {
   DVec3 mean(0.0);
   for (size_t i = 0; i < count; ++i) mean += color_at(source, i);
@@ -142,7 +144,9 @@ std::array<DVec3, 2> first_keys(const AlbedoTexture& source, size_t count) {
   std::vector<float> places(count);
   for (size_t i = 0; i < count; ++i) places[i] = static_cast<float>(glm::dot(color_at(source, i) - mean, axis));
   std::ranges::sort(places);
-  const size_t margin = count / 20;
+  size_t margin = count / 20;
+  constexpr float kClose = 0.25f; // of the whole range
+  if (places[count - 1 - margin] - places[margin] < kClose * (places.back() - places.front())) margin = 0;
   return {mean + axis * double{places[margin]}, mean + axis * double{places[count - 1 - margin]}};
 }
 
@@ -168,6 +172,18 @@ std::array<Rgb8, 2> fitted_keys(const AlbedoTexture& source, const BitSearch& se
   return {rounded((av * bb - bv * ab) / determinant), rounded((bv * aa - av * ab) / determinant)};
 }
 
+/// Sum of the squared differences of an image and what the bits show with two keys.
+double squared_error(const AlbedoTexture& source, const BitSearch& search, size_t count,
+                     const std::array<Rgb8, 2>& keys) {
+  const DVec3 from(keys[0][0], keys[0][1], keys[0][2]), way = DVec3(keys[1][0], keys[1][1], keys[1][2]) - from;
+  double sum = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    const DVec3 difference = from + way * (double{search.level(i)} / kBitLevels) - color_at(source, i);
+    sum += glm::dot(difference, difference);
+  }
+  return sum;
+}
+
 /// The levels whose colours are nearest to those of an image, as real numbers.
 std::vector<float> levels_between(const AlbedoTexture& source, size_t count, const std::array<Rgb8, 2>& keys) {
   const DVec3 from(keys[0][0], keys[0][1], keys[0][2]), way = DVec3(keys[1][0], keys[1][1], keys[1][2]) - from;
@@ -185,19 +201,20 @@ std::vector<float> levels_between(const AlbedoTexture& source, size_t count, con
 BitImage encode_bits(const AlbedoTexture& source) {
   const size_t count = source.rgb.size() / 3;
   const std::array<DVec3, 2> ends = first_keys(source, count);
-  BitImage image;
-  image.keys = {rounded(ends[0]), rounded(ends[1])};
+  std::array<Rgb8, 2> keys{rounded(ends[0]), rounded(ends[1])};
+  BitImage best;
+  double least = std::numeric_limits<double>::infinity();
   constexpr int kRounds = 3;
-  for (int round = 0;; ++round) {
-    BitSearch search(source.width, source.height, levels_between(source, count, image.keys));
+  for (int round = 0; round < kRounds; ++round) {
+    BitSearch search(source.width, source.height, levels_between(source, count, keys));
     search.improve();
-    const std::array<Rgb8, 2> keys = fitted_keys(source, search, count, image.keys);
-    if (round + 1 == kRounds || keys == image.keys) {
-      image.keys = keys, image.bits = search.take_bits();
-      return image;
-    }
-    image.keys = keys;
+    const std::array<Rgb8, 2> fitted = fitted_keys(source, search, count, keys);
+    const double error = squared_error(source, search, count, fitted);
+    if (error < least) least = error, best.keys = fitted, best.bits = search.take_bits();
+    if (fitted == keys) break;
+    keys = fitted;
   }
+  return best;
 }
 
 } // namespace packtrace
