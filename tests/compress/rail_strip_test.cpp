@@ -83,7 +83,7 @@ TEST(RailStrips, KeepEveryTriangle) {
   }
 }
 
-TEST(RailStrips, TakeAThirdOfAListsBytes) {
+TEST(RailStrips, TakeLessThanTwoFifthsOfAListsBytes) {
   constexpr uint32_t kSide = 200;
   std::vector<uint32_t> list = grid(kSide);
   const RailStrip strip = rail_strip(list, kSide * kSide);
