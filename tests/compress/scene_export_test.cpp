@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <set>
+#include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -140,6 +142,44 @@ TEST(ObjExport, InstancesAreStreamed) {
   });
   EXPECT_GT(total, uint64_t{3} << 20);
   EXPECT_LT(largest, size_t{2} << 20);
+}
+
+/// What the export holds at a time does not grow with the size of a mesh.
+TEST(ObjExport, LargeMeshesAreStreamed) {
+  const BakedScene baked = test::bake(test::scene_of(test::grid_mesh(300, 0.1f)));
+  Progress progress;
+  uint64_t total = 0;
+  size_t largest = 0;
+  export_obj(BakedFile::from_bytes(baked.bytes), "a", progress, [&](std::span<const std::byte> bytes) {
+    total += bytes.size();
+    largest = std::max(largest, bytes.size());
+  });
+  constexpr size_t kLongestLine = 128;
+  EXPECT_GT(total, uint64_t{4} << 20);
+  EXPECT_LE(largest, (size_t{1} << 20) + kLongestLine);
+}
+
+/// Far from the world's origin floats are coarser than the lattice.
+TEST(ObjExport, PlacesFarFromTheOriginKeepTheirPrecision) {
+  constexpr int kSide = 8;
+  constexpr double kFar = 1 << 25; // floats are multiples of 4 here
+  Scene scene = test::scene_of(test::grid_mesh(kSide));
+  scene.origin = DVec3(kFar, 0.0, 0.0);
+  const BakedScene baked = test::bake(scene);
+  Progress progress;
+  std::string text;
+  export_obj(BakedFile::from_bytes(baked.bytes), "a", progress, [&](std::span<const std::byte> bytes) {
+    text.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  });
+  std::istringstream lines(text);
+  std::set<double> columns;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("v ")) continue;
+    const double column = (-std::stod(line.substr(2)) - kFar) * kSide;
+    EXPECT_NEAR(column, std::round(column), 0.01) << line;
+    columns.insert(std::round(column));
+  }
+  EXPECT_EQ(columns.size(), size_t{kSide + 1});
 }
 
 TEST(StreamExport, ArraysHoldTheLattice) {

@@ -11,7 +11,8 @@
 namespace packtrace {
 namespace {
 
-void append_vector(std::string& text, std::string_view keyword, std::span<const float> values) {
+template <class T>
+void append_vector(std::string& text, std::string_view keyword, std::span<const T> values) {
   text += keyword;
   append_numbers(text, values);
   text += '\n';
@@ -56,7 +57,7 @@ private:
     for (uint32_t i = 0; i < names_.size(); ++i) {
       const baked::MaterialRecord& record = file_.sections().materials[i];
       text += "newmtl " + names_[i] + "\n";
-      append_vector(text, "Kd ", record.albedo);
+      append_vector(text, "Kd ", std::span<const float>(record.albedo));
       if ((record.flags & (kMetal | kMirror)) != 0)
         text += (record.flags & kMirror) != 0 ? "Pm 1\nPr 0\n" : "Pm 1\nPr 0.5\n";
       if ((record.flags & kEmissive) != 0) text += "Ke 1 1 1\n";
@@ -87,10 +88,11 @@ private:
     text += " " + image + "\n";
   }
 
-  /// World coordinates in the file's right-handed space.
-  std::array<float, 3> placed(const DAffine& map, Vec3 p) const {
+  /// World coordinates in the file's right-handed space. They stay doubles, since far from the origin floats would not
+  /// hold the lattice.
+  std::array<double, 3> placed(const DAffine& map, Vec3 p) const {
     const DVec3 world = transform_point(map, DVec3(p)) + file_.origin();
-    return {static_cast<float>(-world.x), static_cast<float>(world.y), static_cast<float>(world.z)};
+    return {0.0 - world.x, world.y, world.z};
   }
 
   void add_instance(uint32_t number) {
@@ -99,28 +101,38 @@ private:
     const glm::dmat3 normal_map = normal_matrix(map);
     const bool keeps_winding = swaps_handedness(map); // the file's space mirrors once more
     text_ += "o " + plain_name(file_.text(file_.geometries()[instance.geometry].name), number, false) + "\n";
-    if (decoded_ != instance.geometry) // instances of a geometry follow one another
+    if (decoded_ != instance.geometry) { // instances of several geometries may alternate; each change decodes again
+      parts_ = {};                       // before the next geometry takes memory
       parts_ = plain_primitives(file_, decoded_ = instance.geometry);
+    }
     for (const PlainPrimitive& part : parts_) {
       text_ += "usemtl " + names_[file_.sections().material_slots[instance.first_slot + part.material_slot]] + "\n";
-      for (const Vec3& p : part.positions) append_vector(text_, "v ", placed(map, p));
-      for (const Vec2& uv : part.uvs) append_vector(text_, "vt ", std::span(&uv.x, 2));
+      for (const Vec3& p : part.positions) {
+        const std::array<double, 3> world = placed(map, p);
+        append_vector(text_, "v ", std::span<const double>(world));
+        flush(kChunk);
+      }
+      for (const Vec2& uv : part.uvs) {
+        append_vector(text_, "vt ", std::span<const float>(&uv.x, 2));
+        flush(kChunk);
+      }
       for (const Vec3& n : part.normals) {
         const DVec3 turned = glm::normalize(normal_map * DVec3(n));
-        append_vector(
-            text_, "vn ",
-            std::array{static_cast<float>(-turned.x), static_cast<float>(turned.y), static_cast<float>(turned.z)});
+        const Vec3 mirrored(-turned.x, turned.y, turned.z);
+        append_vector(text_, "vn ", std::span<const float>(&mirrored.x, 3));
+        flush(kChunk);
       }
       add_faces(part, keeps_winding);
-      constexpr size_t kChunk = size_t{1} << 20;
-      flush(kChunk);
     }
     ++result_.report.shapes;
   }
 
+  static constexpr size_t kChunk = size_t{1} << 20; // bytes of text that are handed over together
+
   /// Hands the text over if it is longer than some bytes.
   void flush(size_t above) {
     if (text_.size() <= above) return;
+    progress_.check_cancelled();
     sink_(std::as_bytes(std::span(text_)));
     result_.report.file_bytes += text_.size();
     text_.clear();
@@ -140,6 +152,7 @@ private:
         }
       }
       text_ += '\n';
+      flush(kChunk);
     }
     vertices_ += part.positions.size(), uvs_ += part.uvs.size(), normals_ += part.normals.size();
     result_.report.vertices = vertices_, result_.report.triangles += part.triangles.size();
