@@ -22,6 +22,10 @@ struct Past {
 constexpr uint32_t kGuideBytes = 16, kHistoryBytes = 16, kTrendBytes = 4, kSampleBytes = 8, kPairBytes = 12,
                    kNoisyBytes = 4, kResultBytes = 4;
 
+/// Begins saved histories, and changes with the layout of what follows.
+constexpr std::array<std::byte, 8> kSavedLayout = {std::byte{'g'}, std::byte{'p'}, std::byte{'u'}, std::byte{'d'},
+                                                   std::byte{'n'}, std::byte{'0'}, std::byte{'0'}, std::byte{'1'}};
+
 /// Bytes per pixel that the history's kernel reads and writes.
 uint32_t history_bytes(uint32_t flags) {
   uint32_t bytes = 4 + 2 * (kHistoryBytes + kTrendBytes) + kSampleBytes; // with the samples
@@ -265,8 +269,9 @@ std::vector<std::byte> DeviceDenoiser::save() const {
   const State& s = *state_;
   const Past& now = s.past[s.now];
   const uint64_t n = s.pixels();
-  std::vector<std::byte> bytes((kGuideBytes + kHistoryBytes + kTrendBytes) * n);
-  std::span<std::byte> rest = bytes;
+  std::vector<std::byte> bytes(kSavedLayout.size() + (kGuideBytes + kHistoryBytes + kTrendBytes) * n);
+  std::ranges::copy(kSavedLayout, bytes.begin());
+  std::span<std::byte> rest = std::span(bytes).subspan(kSavedLayout.size());
   for (const auto& [buffer, size] :
        {std::pair{&now.guides, kGuideBytes}, {&now.history, kHistoryBytes}, {&now.trend, kTrendBytes}}) {
     download(s.device, *buffer, 0, rest.first(size * n));
@@ -279,6 +284,10 @@ void DeviceDenoiser::restore(std::span<const std::byte> bytes) {
   State& s = *state_;
   const Past& now = s.past[s.now];
   const uint64_t n = s.pixels();
+  if (bytes.size() < kSavedLayout.size() || !std::ranges::equal(bytes.first(kSavedLayout.size()), kSavedLayout))
+    throw Error(ErrorKind::kInput,
+                "denoiser: the saved history is of another backend or version of packtrace; render the frames again");
+  bytes = bytes.subspan(kSavedLayout.size());
   if (bytes.size() != (kGuideBytes + kHistoryBytes + kTrendBytes) * n)
     throw Error(ErrorKind::kInput, "denoiser: the saved history has another size");
   for (const auto& [buffer, size] :

@@ -225,6 +225,31 @@ TEST_F(GpuDenoiserTest, DamagedInput) {
   }
 }
 
+/// With stratified samples, whose variance decreases faster, and with several samples per pixel.
+TEST_F(GpuDenoiserTest, VarianceOfStratifiedSamples) {
+  for (const uint32_t samples : {1u, 4u}) {
+    DenoiserConfig config;
+    config.set("ratio_prior=100");
+    BothDenoisers both(config_, config);
+    AoDenoiser usual(DenoiserConfig{}), of_one(config);
+    for (uint32_t f = 0; f < 12; ++f) {
+      AoFrame ao = noise(kSize, 0.4f, f);
+      ao.stratified = true, ao.samples = samples;
+      const HistorySource source = f == 0 ? HistorySource::kMotion : HistorySource::kUnchanged;
+      both.add(wall(kSize), ao, source);
+      usual.add_frame(wall(kSize), ao, source);
+      ao.samples = 1;
+      of_one.add_frame(wall(kSize), ao, source);
+    }
+    both.compare(std::to_string(samples) + " samples");
+    const std::vector<float>& variance = both.cpu().denoise().variance;
+    EXPECT_GT(rms(variance, usual.denoise().variance), 1e-5) << "the setting has no effect that can be seen";
+    if (samples > 1) {
+      EXPECT_GT(rms(variance, of_one.denoise().variance), 1e-5) << "nor do samples";
+    }
+  }
+}
+
 /// Every setting reaches the kernels.
 TEST_F(GpuDenoiserTest, Settings) {
   ThicketView view({48, 32});
@@ -277,6 +302,20 @@ TEST_F(GpuDenoiserTest, SameBytesInEveryRun) {
   EXPECT_EQ(first.denoise().ao, restored.denoise().ao);
   EXPECT_EQ(first.denoise().tspp, restored.denoise().tspp);
   EXPECT_THROW(restored.restore({7, 7}, first.save()), Error);
+}
+
+TEST_F(GpuDenoiserTest, HistoriesOfOtherLayoutsAreRefused) {
+  AoDenoiser on_cpu(DenoiserConfig{}), on_gpu({}, &config_);
+  on_cpu.add_frame(wall(kSize), noise(kSize, 0.5f, 0)), on_gpu.add_frame(wall(kSize), noise(kSize, 0.5f, 0));
+  std::vector<std::byte> untagged = on_gpu.save();
+  untagged.erase(untagged.begin(), untagged.begin() + 8);
+  for (const std::vector<std::byte>& bytes : {on_cpu.save(), untagged, std::vector<std::byte>(3)}) try {
+      on_gpu.restore(kSize, bytes);
+      FAIL() << "no error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::kInput);
+      EXPECT_NE(std::string(error.what()).find("another backend or version"), std::string::npos) << error.what();
+    }
 }
 
 TEST_F(GpuDenoiserTest, OtherPresetsAreRefused) {
