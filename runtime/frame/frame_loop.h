@@ -62,7 +62,8 @@ public:
 
   /// SceneState::follow_motion().
   bool follow_motion(const SceneMotion& motion) { return state_.follow_motion(motion); }
-  /// Goes on with lights that are turned otherwise (ShadeConfig::light_turn). Only shading begins anew.
+  /// Goes on with lights that are turned otherwise (ShadeConfig::light_turn). Occlusion is kept; without a denoiser
+  /// shading begins anew, and with one its means are followed for a few frames (ShadedHistory::kChanged).
   void turn_lights(float degrees);
 
   /// Number of occlusion pixels per frame.
