@@ -205,13 +205,13 @@ void OutputFile::write(std::span<const std::byte> bytes) {
 
 void OutputFile::append(std::span<const std::byte> bytes) {
   int error = 0;
-  for (size_t done = 0; done < bytes.size() && error == 0;) {
-    const ssize_t n =
-        pwrite(descriptor_.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(written_ + done));
-    if (n >= 0) done += static_cast<size_t>(n);
+  while (!bytes.empty() && error == 0) {
+    const ssize_t n = pwrite(descriptor_.get(), bytes.data(), bytes.size(), static_cast<off_t>(written_));
     if (n < 0 && errno != EINTR) error = errno;
+    if (n <= 0) continue;
+    written_ += static_cast<uint64_t>(n);
+    bytes = bytes.subspan(static_cast<size_t>(n));
   }
-  written_ += bytes.size();
   if (error == EFBIG) fail(target_, "cannot write: larger than files may be here (see ulimit -f)");
   if (error != 0) fail(target_, std::string("cannot write: ") + std::strerror(error));
 }
