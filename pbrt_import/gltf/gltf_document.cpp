@@ -7,6 +7,7 @@
 
 #include "pbrt_import/gltf/gltf_compression.h"
 #include "pbrt_import/text/input_file.h"
+#include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace::gltf {
@@ -185,11 +186,12 @@ std::span<const std::byte> Document::keep(std::vector<std::byte> bytes) {
 }
 
 std::span<const std::byte> Document::uri_bytes(const Value& uri) {
-  const std::string text = uri.text();
+  const std::string_view text = uri.text();
   if (text.starts_with("data:")) {
     const size_t comma = text.find(',');
-    if (comma == std::string::npos || !text.substr(0, comma).ends_with(";base64")) uri.fail("is not a base64 data URI");
-    return keep(decode_base64(std::string_view(text).substr(comma + 1)));
+    if (comma == std::string_view::npos || !text.substr(0, comma).ends_with(";base64"))
+      uri.fail("is not a base64 data URI");
+    return keep(decode_base64(text.substr(comma + 1)));
   }
   const std::filesystem::path path = uri_file(uri);
   context_.named.push_back(path);
@@ -207,13 +209,21 @@ std::span<const std::byte> Document::uri_bytes(const Value& uri) {
   }
 }
 
+template <class Read>
+std::span<const std::byte> Document::read_once(std::map<uint64_t, Content>& contents, uint64_t number,
+                                               const Read& read) {
+  const auto [place, added] = contents.try_emplace(number);
+  Content& content = place->second;
+  if (added) content.problem = problem_of([&] { content.bytes = read(); });
+  if (!content.problem.empty()) fail(content.problem);
+  return content.bytes;
+}
+
 std::span<const std::byte> Document::buffer_bytes(uint64_t number) {
   const Value buffer = element("buffers", number);
   const std::optional<Value> uri = buffer.find("uri");
   if (!uri && (number != 0 || binary_.data() == nullptr)) buffer.fail("has no uri, and is not the binary chunk");
-  auto found = buffers_.find(number);
-  if (found == buffers_.end()) found = buffers_.emplace(number, uri ? uri_bytes(*uri) : binary_).first;
-  const std::span<const std::byte> bytes = found->second;
+  const std::span<const std::byte> bytes = read_once(buffers_, number, [&] { return uri ? uri_bytes(*uri) : binary_; });
   const uint64_t length = buffer.at("byteLength").integer();
   if (length > bytes.size())
     buffer.fail("claims " + std::to_string(length) + " bytes, but has " + std::to_string(bytes.size()));
@@ -221,14 +231,18 @@ std::span<const std::byte> Document::buffer_bytes(uint64_t number) {
 }
 
 std::span<const std::byte> Document::image_bytes(uint64_t number) {
-  if (const auto found = images_.find(number); found != images_.end()) return found->second;
-  const Value image = element("images", number);
-  const std::optional<Value> uri = image.find("uri");
-  return images_[number] = uri ? uri_bytes(*uri) : view_bytes(image.at("bufferView").integer());
+  return read_once(images_, number, [&] {
+    const Value image = element("images", number);
+    const std::optional<Value> uri = image.find("uri");
+    return uri ? uri_bytes(*uri) : view_bytes(image.at("bufferView").integer());
+  });
 }
 
 std::span<const std::byte> Document::view_bytes(uint64_t number) {
-  if (const auto found = views_.find(number); found != views_.end()) return found->second;
+  return read_once(views_, number, [&] { return read_view(number); });
+}
+
+std::span<const std::byte> Document::read_view(uint64_t number) {
   const Value view = element("bufferViews", number);
   const auto part_of = [&](const Value& range) {
     const std::span<const std::byte> buffer = buffer_bytes(range.at("buffer").integer());
@@ -237,14 +251,14 @@ std::span<const std::byte> Document::view_bytes(uint64_t number) {
     return buffer.subspan(static_cast<size_t>(offset), static_cast<size_t>(length));
   };
   const std::optional<Value> compressed = view.extension("EXT_meshopt_compression");
-  if (!compressed) return views_[number] = part_of(view);
+  if (!compressed) return part_of(view);
   const MeshoptView layout = read_meshopt_view(*compressed);
   if (layout.bytes() > view.at("byteLength").integer()) view.fail("is shorter than its compressed content");
   MemoryReservation memory(context_.options.memory);
   memory.resize(layout.bytes(), "decompressing a buffer view");
   std::vector<std::byte> bytes = decode_meshopt(layout, part_of(*compressed), *compressed);
   memory.release();
-  return views_[number] = keep(std::move(bytes));
+  return keep(std::move(bytes));
 }
 
 } // namespace packtrace::gltf

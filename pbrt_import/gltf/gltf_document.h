@@ -50,10 +50,19 @@ public:
   MemoryReservation& values_memory() { return values_memory_; }
 
 private:
+  /// What was read once, or why it could not be.
+  struct Content {
+    std::span<const std::byte> bytes;
+    std::string problem; ///< empty: none
+  };
+  /// Bytes of an element; read() gives them at its first use. Later uses throw the same Error(kInput) if it failed.
+  template <class Read>
+  static std::span<const std::byte> read_once(std::map<uint64_t, Content>& contents, uint64_t number, const Read& read);
   void parse(std::string_view text);
   void split_binary();
   void check_extensions() const;
   std::span<const std::byte> buffer_bytes(uint64_t buffer);
+  std::span<const std::byte> read_view(uint64_t view);
   /// Bytes that a URI names: a data URI, or a file beside the document.
   std::span<const std::byte> uri_bytes(const Value& uri);
   std::span<const std::byte> keep(std::vector<std::byte> bytes);
@@ -65,7 +74,7 @@ private:
   std::string_view json_text_;
   std::span<const std::byte> binary_; ///< chunk of a .glb file
   nlohmann::json json_;
-  std::map<uint64_t, std::span<const std::byte>> buffers_, views_, images_; ///< read so far; buffers to their ends
+  std::map<uint64_t, Content> buffers_, views_, images_; ///< read so far; buffers to their ends
   std::vector<std::unique_ptr<std::vector<std::byte>>> kept_;
   MemoryReservation memory_, values_memory_;
 };

@@ -58,9 +58,9 @@ double Value::number() const {
   return value;
 }
 
-std::string Value::text() const {
+const std::string& Value::text() const {
   if (!json_->is_string()) fail("is not a string");
-  return json_->get<std::string>();
+  return json_->get_ref<const std::string&>();
 }
 
 bool Value::flag() const {

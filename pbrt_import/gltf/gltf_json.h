@@ -35,9 +35,9 @@ public:
   /// Names of an object's members, sorted.
   std::vector<std::string> names() const;
 
-  uint64_t integer() const; ///< a whole number, not negative
-  double number() const;    ///< finite
-  std::string text() const;
+  uint64_t integer() const;        ///< a whole number, not negative
+  double number() const;           ///< finite
+  const std::string& text() const; ///< lives as long as the JSON value
   bool flag() const;
   /// Numbers of an array of this size.
   std::vector<double> numbers(size_t size) const;
