@@ -237,7 +237,7 @@ TEST(GltfImages, FilesAreReadOnce) {
   gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"material", 4}});
   gltf.node({{"mesh", 0}});
   const uint64_t files = import_at(folder, gltf).statistics.files_read;
-  gltf.json["materials"] = {material};
+  gltf.json["materials"] = Json::array({material});
   gltf.json["meshes"][0]["primitives"][0]["material"] = 0;
   EXPECT_EQ(import_at(folder, gltf).statistics.files_read, files);
 
