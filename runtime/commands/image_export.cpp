@@ -1,7 +1,6 @@
 #include "runtime/commands/image_export.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -15,6 +14,7 @@
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/commands/whole_number.h"
 
 namespace packtrace {
 namespace {
@@ -43,10 +43,7 @@ uint32_t find_texture(const BakedFile& file, const std::string& input, const std
                     fmt::format("{} textures are named {}; choose one by its number, such as --texture {}",
                                 named.size(), wanted, named.front()));
   if (!named.empty()) return named.front();
-  uint32_t number = 0;
-  const char* const end = wanted.data() + wanted.size();
-  const auto [stop, error] = std::from_chars(wanted.data(), end, number);
-  if (error == std::errc() && stop == end && number < count) return number;
+  if (const auto number = whole_number(wanted); number && *number < count) return *number;
   std::string names;
   for (uint32_t t = 0; t < std::min(count, 8u); ++t)
     names += fmt::format("{}{} ({})", t > 0 ? ", " : "", t, texture_name(file, t));

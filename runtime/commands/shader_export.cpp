@@ -1,7 +1,6 @@
 #include "runtime/commands/shader_export.h"
 
 #include <algorithm>
-#include <charconv>
 
 #include <fmt/format.h>
 
@@ -13,6 +12,7 @@
 #include "runtime/commands/image_export.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/commands/whole_number.h"
 
 namespace packtrace {
 namespace {
@@ -35,10 +35,7 @@ uint32_t find_geometry(const BakedFile& file, const std::string& input, const st
   }
   for (uint32_t g = 0; g < count; ++g)
     if (file.text(file.geometries()[g].name) == *wanted) return g;
-  uint32_t number = 0;
-  const char* const end = wanted->data() + wanted->size();
-  const auto [stop, error] = std::from_chars(wanted->data(), end, number);
-  if (error == std::errc() && stop == end && number < count) return number;
+  if (const auto number = whole_number(*wanted); number && *number < count) return *number;
   throw FileError(ErrorKind::kUsage, input, "it has no geometry " + *wanted);
 }
 

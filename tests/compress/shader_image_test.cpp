@@ -74,7 +74,7 @@ TEST(ShaderImage, FilteredBitsShowSoftShapes) {
   const AlbedoTexture halves =
       picture(40, 40, [](uint32_t x, uint32_t) { return x < 20 ? Rgb8{0, 0, 0} : Rgb8{255, 240, 10}; });
   const ShaderImage image = encode_shader_image(halves, TexelFormat::kBit);
-  // The filter cannot show the edge as it is; the keys make up for it by a little.
+  // The filter blurs the edge; the keys overshoot slightly to compensate.
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(image.texel(0, 0)[c], 0, 5);
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(image.texel(39, 39)[c], (Rgb8{255, 240, 10})[c], 5);
 }

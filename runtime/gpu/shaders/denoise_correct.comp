@@ -6,7 +6,7 @@
 
 layout(constant_id = 2) const uint kRadius = 4u; // of the window, at most 4
 
-// Shared memory limits how many groups run at once, so they have many threads.
+// Shared memory limits how many groups run at once, so each group has many threads.
 layout(local_size_x = 32, local_size_y = 16) in;
 const uint kThreads = 512u;
 layout(std430, binding = 0) readonly restrict buffer Samples { vec2 samples[]; };

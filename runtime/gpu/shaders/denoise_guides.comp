@@ -4,7 +4,7 @@
 // runtime/denoise/kernels/filter_rows_body.h.
 #include "denoise.glsl"
 
-// Shared memory limits how many groups run at once, so they have many threads.
+// Shared memory limits how many groups run at once, so each group has many threads.
 layout(local_size_x = 32, local_size_y = 16) in;
 const uint kThreads = 512u;
 layout(std430, binding = 0) readonly restrict buffer Guides { uvec4 guides[]; };

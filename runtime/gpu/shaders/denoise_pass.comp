@@ -4,7 +4,7 @@
 // weigh_row(), normalise_row(), exchange_row() and raise_precisions() of runtime/denoise/kernels/filter_rows_body.h.
 #include "denoise.glsl"
 
-// Shared memory limits how many groups run at once, so they have many threads.
+// Shared memory limits how many groups run at once, so each group has many threads.
 const uint kThreads = STEP == 4 ? 1024u : 512u;
 #if STEP == 4
 layout(local_size_x = 32, local_size_y = 32) in;
@@ -37,7 +37,7 @@ void load_noisy(ivec2 origin) {
   }
 }
 
-// Distance of the values of a pair.
+// Squared difference of a pair's values relative to its variance, in fixed point.
 uint distance_of(uint p, uint q) {
   uint pp = p >> 16, pq = q >> 16, least = min(pp, pq), most = max(pp, pq);
   uint precision_of_pair = min(mean_up(least, mean_up(least, most)), least + (least >> 2) + (least >> 3));
