@@ -21,8 +21,10 @@
 #include "pbrt_import/base/printable.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
+#include "runtime/commands/companion_files.h"
 #include "runtime/commands/export_reports.h"
 #include "runtime/commands/file_report.h"
+#include "runtime/commands/gltf_options.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
@@ -33,20 +35,14 @@ namespace packtrace {
 namespace {
 
 constexpr const char *kShader = "glsl", *kVertex16 = "vertex16", *kGltf = "gltf", *kPbrt = "pbrt", *kObj = "obj",
-                     *kStreams = "streams", *kDraco = "draco", *kMeshopt = "meshopt", *kNone = "none",
-                     *kPortable = "portable", *kWeb = "web", *kExchange = "exchange";
+                     *kStreams = "streams";
 
 struct ExportOptions {
   std::string input, output;
   std::string streams; ///< raw: arrays; empty: none
   std::string layout;  ///< empty: chosen by the output's extension
-  std::string profile = kExchange;
-  std::optional<std::string> codec;
-  std::optional<int> level, normal_bits, uv_bits;
-  std::optional<double> webp_psnr;
-  bool instancing = false, levels = false;
+  GltfOptions gltf;
   ShaderOptions shader;
-  bool has_gltf_option = false; ///< whether an option was given that applies to glTF only
 };
 
 /// The exported file and its reports.
@@ -96,34 +92,10 @@ std::string stem_of(const ExportOptions& options) {
   return to_utf8(std::filesystem::path(options.output).stem().string());
 }
 
-/// The profile's settings with those that options replace.
-GltfConfig gltf_config(const ExportOptions& options) {
-  GltfConfig config = gltf_profile(options.profile == kPortable ? GltfProfile::kPortable
-                                   : options.profile == kWeb    ? GltfProfile::kWeb
-                                                                : GltfProfile::kExchange);
-  if (options.codec)
-    config.codec = *options.codec == kDraco     ? GltfCodec::kDraco
-                   : *options.codec == kMeshopt ? GltfCodec::kMeshopt
-                                                : GltfCodec::kNone;
-  if (options.level) config.draco.level = *options.level;
-  if (options.normal_bits)
-    (config.codec == GltfCodec::kMeshopt ? config.meshopt_normal_bits : config.draco.normal_bits) =
-        *options.normal_bits;
-  if (options.uv_bits) config.draco.uv_bits = *options.uv_bits;
-  if (options.webp_psnr) config.webp_psnr = *options.webp_psnr;
-  config.instancing |= options.instancing;
-  config.levels |= options.levels;
-  if (ending_of(options.output) == ".gltf") config.buffer_name = stem_of(options) + ".bin";
-  return config;
-}
-
-std::string name_of(GltfCodec codec) {
-  return codec == GltfCodec::kDraco ? kDraco : codec == GltfCodec::kMeshopt ? kMeshopt : kNone;
-}
-
 /// @param main takes what is written of the main file while it is made
+/// @param companions checks the names of files beside it that are known before the work starts
 Exported export_file(const ExportOptions& options, const std::string& layout, const MemoryBudget& budget,
-                     Progress& progress, const ByteSink& main) {
+                     Progress& progress, const ByteSink& main, const CompanionFiles& companions) {
   if (layout == kShader) {
     ShaderExport result = export_shader(options.input, options.output, options.shader, budget, progress);
     return {std::move(result.bytes), {}, std::move(result.json), std::move(result.text)};
@@ -135,8 +107,10 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
   const BakedFile file = BakedFile::open(options.input);
   ExportNames names{options.input, options.output, {}, {}, {}};
   if (layout == kGltf) {
-    const GltfConfig config = gltf_config(options);
-    names.profile = options.profile, names.codec = name_of(config.codec);
+    GltfConfig config = options.gltf.config();
+    if (ending_of(options.output) == ".gltf") config.buffer_name = stem_of(options) + ".bin";
+    if (!config.buffer_name.empty()) companions.check(config.buffer_name);
+    names.profile = options.gltf.profile_name(), names.codec = name_of(config.codec);
     GltfExport result = export_gltf(file, config, progress);
     std::vector<ExportedFile> others;
     if (!config.buffer_name.empty()) others.push_back({config.buffer_name, std::move(result.buffer)});
@@ -145,6 +119,8 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
   if (layout != kVertex16) {
     names.layout = layout;
     const std::string stem = stem_of(options);
+    if (layout == kObj)
+      for (const std::string& name : obj_companions(file, stem)) companions.check(name);
     SceneExport result = layout == kPbrt  ? export_pbrt(file, stem, progress)
                          : layout == kObj ? export_obj(file, stem, progress, main)
                                           : export_streams(file, stem, progress);
@@ -159,85 +135,37 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
   return {std::move(result.bytes), {}, to_json(names, result.report), to_text(names, result.report)};
 }
 
-/// Writes the files that belong to the main file, in its folder.
-void write_others(const ExportOptions& options, const std::vector<ExportedFile>& files, bool force) {
-  const std::filesystem::path folder = std::filesystem::path(options.output).parent_path();
-  for (const ExportedFile& file : files) {
-    const std::filesystem::path path = folder / file.name;
-    std::error_code error; // OutputFile reports a folder that is not there
-    if (path.parent_path() != folder) std::filesystem::create_directory(path.parent_path(), error);
-    OutputFile output(path, force);
-    refuse_to_replace({options.input}, path);
-    output.write(file.bytes);
-    output.commit();
-  }
+/// Throws Error(kUsage) for options that have no effect on the format or on what other options choose.
+void refuse_other_options(const ExportOptions& options, const std::string& layout) {
+  const std::string format = "the format " + layout + ", only on ";
+  if (layout != kShader) refuse_without_effect(options.shader.names(), format + "shaders (.glsl)");
+  if (layout != kGltf)
+    refuse_without_effect(options.gltf.names(), format + "glTF (.glb, .gltf)");
+  else
+    options.gltf.config();
 }
 
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
-  if (layout != kShader) refuse_without_effect(options.shader.names(), "--layout " + layout + ", only on .glsl files");
-  if (layout != kGltf && options.has_gltf_option)
-    throw Error(
-        ErrorKind::kUsage,
-        "--profile, --codec, --level, --normal-bits, --uv-bits, --webp-psnr, --instancing and --levels only apply "
-        "to --layout gltf");
+  refuse_other_options(options, layout);
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
   refuse_to_replace({options.input});
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const Exported result = export_file(options, layout, globals.memory, progress,
-                                      [&output](std::span<const std::byte> bytes) { output.append(bytes); });
-  write_others(options, result.others, globals.force);
+  CompanionFiles companions(options.output, options.input, globals.force);
+  const Exported result = export_file(
+      options, layout, globals.memory, progress, [&output](std::span<const std::byte> bytes) { output.append(bytes); },
+      companions);
+  companions.write(result.others, progress);
   output.write(result.bytes);
+  companions.keep();
   display.finish();
   if (json.wanted()) json.write(result.json);
   if (json.to_stdout() || globals.quiet) return 0;
   print_printable(result.text, output.text_stream());
   return 0;
-}
-
-/// Adds the options that apply to glTF only.
-void add_gltf_options(CLI::App& verb, ExportOptions& options) {
-  const auto of_gltf = [&options](const std::string&) { options.has_gltf_option = true; };
-  verb.add_option("--profile", options.profile,
-                  "What a glTF file is for. portable uses no extension, so every viewer reads it; web is small and "
-                  "decodes fast in browsers: integers with EXT_meshopt_compression, instances with "
-                  "EXT_mesh_gpu_instancing, WebP images; exchange is for other programs: Draco, all names (default "
-                  "exchange). The options below replace single settings of a profile")
-      ->check(one_of({kPortable, kWeb, kExchange}))
-      ->each(of_gltf)
-      ->capture_default_str();
-  verb.add_option("--codec", options.codec,
-                  "Geometry compression for gltf. draco uses KHR_draco_mesh_compression, meshopt "
-                  "EXT_meshopt_compression; none stores floats")
-      ->check(one_of({kDraco, kMeshopt, kNone}))
-      ->each(of_gltf);
-  verb.add_option("--level", options.level, "Draco compression level, 0 (fastest) to 10 (smallest file) (default 7)")
-      ->check(CLI::Range(0, 10))
-      ->each(of_gltf);
-  verb.add_option("--normal-bits", options.normal_bits,
-                  "Quantisation bits of octahedral normals: Draco 2..30 (default 12), meshopt 4..16 (default 8)")
-      ->check(CLI::Range(2, 30))
-      ->each(of_gltf);
-  verb.add_option("--uv-bits", options.uv_bits,
-                  "Draco quantisation bits of texture coordinates over their range, 1..30 (default 14). Raise it if "
-                  "textures shift. meshopt takes as many as an eighth of a texel needs")
-      ->check(CLI::Range(1, 30))
-      ->each(of_gltf);
-  verb.add_option("--webp-psnr", options.webp_psnr,
-                  "Write images as WebP of at least this PSNR in dB, 0..100; 100 is lossless, 0 writes PNG (default 40 "
-                  "for web, else 0)")
-      ->check(CLI::Range(0.0, 100.0))
-      ->each(of_gltf);
-  verb.add_flag("--instancing", options.instancing,
-                "Store the instances of a mesh in one node with EXT_mesh_gpu_instancing: much smaller files of many "
-                "instances, for viewers that know the extension")
-      ->each(of_gltf);
-  verb.add_flag("--levels", options.levels,
-                "Write levels of detail with MSFT_lod, with the screen coverage at which their error is a pixel")
-      ->each(of_gltf);
 }
 
 } // namespace
@@ -258,12 +186,12 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
           "vertex16 has 16 bytes per vertex and 16- or 32-bit indices, for direct upload to a GPU (default: "
           "gltf for .glb and .gltf, vertex16 for .v16). glsl is one fragment shader that holds and traces voxels")
       ->check(one_of({kVertex16, kGltf, kShader}));
-  add_shader_options(verb, options->shader);
   verb.add_option("--streams", options->streams,
                   "Write what the file stores as arrays: raw makes NumPy files (.npy), which the output, a .json file, "
                   "describes")
       ->check(one_of({"raw"}));
-  add_gltf_options(verb, *options);
+  add_gltf_options(verb, options->gltf);
+  add_shader_options(verb, options->shader);
   verb.footer("vertex16 packs position (3 x 21 bits), normal (24), tangent (1 + 8) and uv\n"
               "(2 x 16) of a vertex. docs/vertex16.md describes the file;\n"
               "compress/exchange/vertex16/vertex16.glsl and vertex16_decode.h decode it. Positions in glTF\n"

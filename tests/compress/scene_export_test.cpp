@@ -124,6 +124,18 @@ TEST(ObjExport, FacesComeBack) {
   EXPECT_EQ(after, mirrored);
 }
 
+TEST(ObjExport, CompanionsAreKnownBefore) {
+  Scene scene = test::mixed_scene();
+  const BakedScene baked = test::bake(std::move(scene));
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_FALSE(file.sections().textures.empty() && file.sections().masks.empty());
+  Progress progress;
+  std::vector<std::string> names;
+  for (const ExportedFile& f : export_obj(file, "a", progress, [](std::span<const std::byte>) {}).files)
+    names.push_back(f.name);
+  EXPECT_EQ(obj_companions(file, "a"), names);
+}
+
 /// What the export holds at a time does not grow with the number of instances.
 TEST(ObjExport, InstancesAreStreamed) {
   Scene scene = test::mixed_scene();

@@ -176,4 +176,10 @@ SceneExport export_obj(const BakedFile& file, const std::string& stem, Progress&
   return ObjWriter(file, stem, progress, sink).run();
 }
 
+std::vector<std::string> obj_companions(const BakedFile& file, const std::string& stem) {
+  std::vector<std::string> names = image_files(file, stem + "_files");
+  names.push_back(stem + ".mtl");
+  return names;
+}
+
 } // namespace packtrace

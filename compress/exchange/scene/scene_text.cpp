@@ -44,6 +44,13 @@ std::string mask_file(const std::string& folder, uint32_t mask) {
   return folder + "/mask_" + std::to_string(mask) + ".png";
 }
 
+std::vector<std::string> image_files(const BakedFile& file, const std::string& folder) {
+  std::vector<std::string> names;
+  for (uint32_t i = 0; i < file.sections().textures.size(); ++i) names.push_back(texture_file(folder, i));
+  for (uint32_t i = 0; i < file.sections().masks.size(); ++i) names.push_back(mask_file(folder, i));
+  return names;
+}
+
 void add_images(const BakedFile& file, const std::string& folder, SceneExport& result) {
   for (uint32_t i = 0; i < file.sections().textures.size(); ++i)
     result.files.push_back({texture_file(folder, i), encode_png(image_of({}, file.texture(i)))});

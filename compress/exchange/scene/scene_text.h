@@ -29,7 +29,9 @@ std::string plain_name(std::string_view name, uint32_t number, bool allow_spaces
 
 std::vector<std::byte> bytes_of_text(std::string_view text);
 
-/// Adds the PNG files of all textures, "FOLDER/texture_3.png", and masks, "FOLDER/mask_3.png".
+/// Names of the PNG files of all textures, "FOLDER/texture_3.png", and then of all masks, "FOLDER/mask_3.png".
+std::vector<std::string> image_files(const BakedFile& file, const std::string& folder);
+/// Adds these files.
 void add_images(const BakedFile& file, const std::string& folder, SceneExport& result);
 std::string texture_file(const std::string& folder, uint32_t texture);
 std::string mask_file(const std::string& folder, uint32_t mask);
