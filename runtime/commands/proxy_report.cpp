@@ -30,14 +30,13 @@ std::string field_line(const ProxySummary& use) {
 
 std::string line_of(const ProxySummary& use) {
   if (use.kind == voxels::kFieldProxy) return field_line(use);
-  std::string text =
-      fmt::format(grouped(),
-                  "proxy {}: voxels {} x {} x {}, {}{}, edge {:.4g}; {:L} voxels stored in {:L} bits ({:.2f} per "
-                  "voxel, index {:L})",
-                  use.name.empty() ? "(no name)" : use.name, use.size[0], use.size[1], use.size[2], surface_of(use),
-                  (use.flags & voxels::kFilled) != 0 ? " and filled" : "", use.edge, use.stored_voxels, use.bits,
-                  use.stored_voxels > 0 ? static_cast<double>(use.bits) / static_cast<double>(use.stored_voxels) : 0.0,
-                  use.index_bits);
+  std::string text = fmt::format(
+      grouped(),
+      "proxy {}: voxels {} x {} x {}, {}{}, edge {:.4g}; {:L} voxels in {:L} bits ({:.2f} per "
+      "voxel, index {:L})",
+      use.name.empty() ? "(no name)" : use.name, use.size[0], use.size[1], use.size[2], surface_of(use),
+      (use.flags & voxels::kFilled) != 0 ? " and filled" : "", use.edge, use.voxels, use.bits,
+      use.voxels > 0 ? static_cast<double>(use.bits) / static_cast<double>(use.voxels) : 0.0, use.index_bits);
   if (use.swatches > 0) text += fmt::format(", {} colours", use.swatches);
   return text + fmt::format(", error {:.3g} from surface to voxels, {:.3g} back ({:.2f} and {:.2f} of the diagonal)\n",
                             use.surface_error, use.voxel_error, per_diagonal(use, use.surface_error),
@@ -76,6 +75,7 @@ nlohmann::json proxies_json(const FileSummary& s) {
                     {"closed", (use.flags & voxels::kClosedSource) != 0},
                     {"filled", (use.flags & voxels::kFilled) != 0},
                     {"signed", (use.flags & voxels::kSigned) != 0},
+                    {"voxels", use.voxels},
                     {"stored_voxels", use.stored_voxels},
                     {"bits", use.bits},
                     {"index_bits", use.index_bits},

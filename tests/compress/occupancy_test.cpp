@@ -44,6 +44,7 @@ TEST(Occupancy, DecodesToTheEncodedSet) {
           const OccupancyStream stream = encode_occupancy(set, options);
           EXPECT_EQ(find_occupancy_fault(stream.header(), stream.words()), std::nullopt);
           ASSERT_TRUE(decode_occupancy(stream) == set) << size[0] << ' ' << levels << ' ' << form;
+          ASSERT_EQ(count_occupied(stream), set.count()) << size[0] << ' ' << levels << ' ' << form;
           uint32_t state = 3;
           for (int i = 0; i < 3000; ++i) {
             const VoxelIndex v = {next(state) % size[0], next(state) % size[1], next(state) % size[2]};
@@ -85,6 +86,8 @@ TEST(Occupancy, SharingEqualSubtreesTakesFewerBits) {
   options.dag = true;
   const OccupancyStream dag = encode_occupancy(set, options);
   EXPECT_LT(dag.bits() * 50, tree);
+  EXPECT_LT(dag.stored_voxels() * 50, set.count());
+  EXPECT_EQ(count_occupied(dag), set.count());
   EXPECT_TRUE(decode_occupancy(dag) == set);
 }
 

@@ -8,6 +8,7 @@
 
 #include "compress/bake/proxies/build_proxies.h"
 #include "compress/bake/proxies/geometry_voxels.h"
+#include "compress/format/file/file_summary.h"
 #include "compress/format/voxels/proxy_section.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
@@ -109,6 +110,20 @@ TEST(Proxies, FlatGeometryHasOneLayerOfVoxels) {
   const Proxy proxy = proxies_of(test::bake(test::scene_of(test::grid_mesh(4)), proxy_config(16))).at(0);
   EXPECT_EQ(proxy.voxels.size(), (VoxelIndex{16, 16, 1}));
   EXPECT_EQ(decode_occupancy(proxy.voxels).count(), 256u);
+}
+
+TEST(Proxies, VoxelsOfSharedNodesAndOfFullCellsAreCounted) {
+  BakeConfig config = proxy_config(64);
+  config.proxy.dag = true;
+  const BakedFile flat = BakedFile::from_bytes(test::bake(test::scene_of(test::grid_mesh(4)), config).bytes);
+  const ProxySummary shared = summarize(flat).proxies.at(0);
+  EXPECT_EQ(shared.voxels, 64u * 64u);
+  EXPECT_LT(shared.stored_voxels * 4, shared.voxels);
+  config.proxy.dag = false, config.proxy.fill = true;
+  const BakedFile ball = BakedFile::from_bytes(test::bake(test::scene_of(test::sphere_mesh(40)), config).bytes);
+  const ProxySummary filled = summarize(ball).proxies.at(0);
+  EXPECT_EQ(filled.voxels, decode_occupancy(read_proxies(proxy_bytes(ball)).at(0).voxels).count());
+  EXPECT_LT(filled.stored_voxels * 2, filled.voxels);
 }
 
 TEST(Proxies, MasksLeaveHoles) {

@@ -156,15 +156,19 @@ std::vector<ProxySummary> summarize_proxies(const BakedFile& file) {
   if (bytes.empty()) return result;
   for (const Proxy& proxy : read_proxies(bytes)) {
     const voxels::ProxyRecord& r = proxy.record;
+    ProxySummary use;
+    use.name = file.text(file.geometries()[r.geometry].name);
+    use.kind = r.kind, use.flags = r.flags;
+    use.edge = r.edge, use.surface_error = r.surface_error, use.voxel_error = r.voxel_error;
     if (proxy.is_field()) {
-      result.push_back({std::string(file.text(file.geometries()[r.geometry].name)), r.kind, r.flags, 0,
-                        proxy.field.size(), r.edge, r.surface_error, r.voxel_error,
-                        uint64_t{proxy.field.header().stored_bricks} * voxels::kBrickSamples, proxy.field.bits(), 0});
-      continue;
+      use.size = proxy.field.size(), use.bits = proxy.field.bits();
+      use.stored_voxels = uint64_t{proxy.field.header().stored_bricks} * voxels::kBrickSamples;
+    } else {
+      use.size = proxy.voxels.size(), use.swatches = r.palette_count;
+      use.voxels = count_occupied(proxy.voxels), use.stored_voxels = proxy.voxels.stored_voxels();
+      use.bits = proxy.voxels.bits(), use.index_bits = proxy.voxels.index_bits();
     }
-    result.push_back({std::string(file.text(file.geometries()[r.geometry].name)), r.kind, r.flags, r.palette_count,
-                      proxy.voxels.size(), r.edge, r.surface_error, r.voxel_error, proxy.voxels.stored_voxels(),
-                      proxy.voxels.bits(), proxy.voxels.index_bits()});
+    result.push_back(std::move(use));
   }
   return result;
 }

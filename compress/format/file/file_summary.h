@@ -91,18 +91,19 @@ struct LevelChainUse {
   uint64_t instances = 0;
 };
 
-/// Report of `info` about a baked file. Counts of geometries, triangles and so on are those of level 0; bytes include
-/// all levels.
 /// A proxy, see proxy_format.h.
 struct ProxySummary {
   std::string name; ///< of the geometry
   uint32_t kind = 0, flags = 0, swatches = 0;
   VoxelIndex size{};
   double edge = 0.0, surface_error = 0.0, voxel_error = 0.0;
-  uint64_t stored_voxels = 0;        ///< of a field: samples
+  uint64_t voxels = 0;        ///< occupied; of a field: 0
+  uint64_t stored_voxels = 0; ///< whose bits are stored: less with shared nodes or full cells; of a field: samples
   uint64_t bits = 0, index_bits = 0; ///< without the header
 };
 
+/// Report of `info` about a baked file. Counts of geometries, triangles and so on are those of level 0; bytes include
+/// all levels.
 struct FileSummary {
   uint64_t triangles = 0, placed_triangles = 0, vertices = 0, placed_vertices = 0, clusters = 0;
   uint64_t lights = 0, area_light_materials = 0; ///< only in files baked for shading

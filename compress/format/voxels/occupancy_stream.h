@@ -44,7 +44,7 @@ public:
   /// Bits of the words, and those of them that only make access fast (ranks).
   uint64_t bits() const { return words_.size() * uint64_t{32}; }
   uint64_t index_bits() const;
-  /// Voxels whose bits the last level stores; voxels of full cells are not among them.
+  /// Set bits of the last level: a shared node counts once, and voxels of full cells do not count.
   uint64_t stored_voxels() const { return header_.level[header_.levels - 1].set_bits; }
 
   /// Whether a voxel of the grid is set. Takes O(levels).
@@ -112,6 +112,10 @@ struct OccupancyOptions {
 /// Encodes a set of at least one voxel. Throws Error(kUsage) for options out of range, Error(kLimitExceeded) if a level
 /// has more than 2^32 bits.
 OccupancyStream encode_occupancy(const VoxelSet& set, const OccupancyOptions& options);
+
+/// Set voxels of a stream: those of every reference to a shared node, and of full cells. Takes time in the number of
+/// stored nodes and of cells at the grid's far sides, and 8 bytes per node if nodes are shared.
+uint64_t count_occupied(const OccupancyStream& stream);
 
 /// All voxels of a stream.
 VoxelSet decode_occupancy(const OccupancyStream& stream);

@@ -1,0 +1,81 @@
+#include <algorithm>
+#include <bit>
+
+#include "compress/format/voxels/occupancy_stream.h"
+
+namespace packtrace {
+namespace {
+
+using Cell = OccupancyStream::Cell;
+
+class OccupiedCounter {
+public:
+  explicit OccupiedCounter(const OccupancyStream& stream) : stream_(stream), last_(stream.levels() - 1) {
+    const voxels::OccupancyHeader& h = stream.header();
+    bool shared = false;
+    for (uint32_t l = 1; l < h.levels; ++l) shared |= h.level[l].pointer_bits > 0;
+    for (uint32_t l = 1; l + 1 < h.levels && shared; ++l) known_[l].resize(h.level[l].mask_bits / 8, kUnknown);
+  }
+
+  uint64_t run() {
+    const VoxelIndex& top = stream_.header().top;
+    uint64_t sum = 0, bit = 0;
+    for (uint32_t z = 0; z < top[2]; ++z)
+      for (uint32_t y = 0; y < top[1]; ++y)
+        for (uint32_t x = 0; x < top[0]; ++x) sum += of_cell(0, bit++, {x << last_, y << last_, z << last_});
+    return sum;
+  }
+
+private:
+  static constexpr uint64_t kUnknown = ~uint64_t{0};
+
+  /// Voxels of a cell that lie in the grid.
+  uint64_t size_of(uint32_t level, const VoxelIndex& low) const {
+    uint64_t product = 1;
+    for (size_t a = 0; a < 3; ++a) {
+      const uint32_t size = stream_.size()[a];
+      product *= low[a] < size ? std::min(1u << (last_ - level), size - low[a]) : 0;
+    }
+    return product;
+  }
+
+  /// @param level not the last
+  uint64_t of_cell(uint32_t level, uint64_t bit, const VoxelIndex& low) {
+    const Cell cell = stream_.cell(level, bit);
+    if (cell == Cell::kEmpty) return 0;
+    const uint64_t size = size_of(level, low);
+    if (cell == Cell::kFull || size == 0) return size;
+    const uint64_t node = stream_.node(level, bit);
+    // Nodes beyond a side of the grid count in part, and differently at each place.
+    const bool whole = size == uint64_t{1} << (3 * (last_ - level));
+    if (!whole || known_[level + 1].empty()) return of_node(level + 1, node, low, whole);
+    uint64_t& known = known_[level + 1][node];
+    if (known == kUnknown) known = of_node(level + 1, node, low, true);
+    return known;
+  }
+
+  uint64_t of_node(uint32_t level, uint64_t node, const VoxelIndex& low, bool whole) {
+    if (level == last_ && whole) return static_cast<uint64_t>(std::popcount(stream_.mask(level, node)));
+    const uint32_t shift = last_ - level;
+    uint64_t sum = 0;
+    for (uint32_t o = 0; o < 8; ++o) {
+      const VoxelIndex at = {low[0] + ((o & 1) << shift), low[1] + ((o >> 1 & 1) << shift),
+                             low[2] + ((o >> 2) << shift)};
+      if (level < last_)
+        sum += of_cell(level, 8 * node + o, at);
+      else if (stream_.mask_bit(level, 8 * node + o))
+        sum += size_of(level, at);
+    }
+    return sum;
+  }
+
+  const OccupancyStream& stream_;
+  uint32_t last_;
+  std::array<std::vector<uint64_t>, voxels::kMaxLevels> known_; ///< by node; empty if no node is shared
+};
+
+} // namespace
+
+uint64_t count_occupied(const OccupancyStream& stream) { return OccupiedCounter(stream).run(); }
+
+} // namespace packtrace
