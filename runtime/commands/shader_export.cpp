@@ -120,8 +120,8 @@ void add_shader_options(CLI::App& verb, ShaderOptions& options) {
       ->group(kGroup);
   verb.add_option(
           "--max-elements", options.max_elements,
-          "Most elements of constant arrays, 32 bits each (default 4096; 1024 for wide support). More is refused "
-          "with the largest grid that fits")
+          "Most elements of all constant arrays together, a vec3 counts as one (default 4096; 1024 for wide support). "
+          "More is refused with the largest grid that fits")
       ->type_name("N")
       ->group(kGroup);
   verb.add_option("--up", options.up, "Axis of the geometry that points up in the picture (default y)")

@@ -34,7 +34,7 @@ struct ShaderImage {
   Rgb8 texel(uint32_t x, uint32_t y) const;
 };
 
-/// 32-bit elements of the arrays of an image.
+/// Elements of the arrays of an image, as kMaxShaderElements counts them.
 uint64_t shader_image_elements(TexelFormat format, uint32_t width, uint32_t height);
 
 /// Longest side of the largest image of the same shape, at most `width` x `height`, that fits; 0 if none does.

@@ -15,8 +15,10 @@ enum class ShaderForm : uint32_t {
   kGlsl450,   ///< a fragment shader for Vulkan: out vec4 at location 0, resolution as a push constant
 };
 
-/// Published limits of constant arrays, in 32-bit elements.
-inline constexpr uint32_t kMaxShaderElements = 4096;      ///< of Shadertoy on most devices
+/// Published limits of the elements of all constant arrays of a shader together. An element of any type up to vec4
+/// counts as one: Direct3D 11, which runs WebGL on Windows, keeps them in one buffer of vectors of four 32-bit
+/// components. Source: Microsoft, d3d11.h, D3D11_REQ_IMMEDIATE_CONSTANT_BUFFER_ELEMENT_COUNT.
+inline constexpr uint32_t kMaxShaderElements = 4096;
 inline constexpr uint32_t kPortableShaderElements = 1024; ///< for wide support
 
 struct ShaderConfig {

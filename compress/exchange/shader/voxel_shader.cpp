@@ -196,13 +196,17 @@ std::string palette_text(const Proxy& proxy, const ShaderView& view) {
          std::to_string(proxy.voxels.swatch_place()) + ", rank(LEVELS - 1, leaf) * " + bits + ", " + bits + ")];\n}\n";
 }
 
+/// Arrays with an entry per level.
+constexpr std::array<const char*, 6> kLevelArrays = {"MASKS", "GROUPS", "BLOCKS", "FULL", "POINTERS", "POINTER_BITS"};
+
 std::string constants_text(const Proxy& proxy, const ShaderView& view) {
   const voxels::OccupancyHeader& h = proxy.voxels.header();
-  std::array<std::vector<int32_t>, 6> places;
+  std::array<std::vector<int32_t>, kLevelArrays.size()> places;
   for (uint32_t l = 0; l < h.levels; ++l) {
     const OccupancyStream::LevelPlace& p = proxy.voxels.place(l);
-    const std::array<uint64_t, 6> of_level = {p.masks, p.groups, p.blocks, p.full, p.pointers, h.level[l].pointer_bits};
-    for (size_t i = 0; i < 6; ++i) places[i].push_back(static_cast<int32_t>(of_level[i]));
+    const std::array<uint64_t, kLevelArrays.size()> of_level = {p.masks, p.groups,   p.blocks,
+                                                                p.full,  p.pointers, h.level[l].pointer_bits};
+    for (size_t i = 0; i < places.size(); ++i) places[i].push_back(static_cast<int32_t>(of_level[i]));
   }
   const auto ivec = [](const std::array<uint32_t, 3>& v) {
     return "ivec3(" + std::to_string(v[0]) + ", " + std::to_string(v[1]) + ", " + std::to_string(v[2]) + ")";
@@ -211,8 +215,7 @@ std::string constants_text(const Proxy& proxy, const ShaderView& view) {
                      ", TOP = " + ivec(h.top) + ";\nconst int STEPS = " +
                      std::to_string(1 + h.size[0] + h.size[1] + h.size[2]) + // each crosses a plane
                      ";\nconst bool HAS_FULL = " + ((h.flags & voxels::kHasFull) != 0 ? "true" : "false") + ";\n";
-  constexpr std::array<const char*, 6> kNames = {"MASKS", "GROUPS", "BLOCKS", "FULL", "POINTERS", "POINTER_BITS"};
-  for (size_t i = 0; i < 6; ++i) text += glsl_ints(kNames[i], places[i]);
+  for (size_t i = 0; i < places.size(); ++i) text += glsl_ints(kLevelArrays[i], places[i]);
   text += "const vec3 EYE = " + glsl_vec3(view.eye) + ", FORWARD = " + glsl_vec3(view.forward) +
           ",\n  RIGHT = " + glsl_vec3(view.right) + ", UP = " + glsl_vec3(view.up) +
           ",\n  BACKGROUND = " + glsl_vec3(view.background) +
@@ -248,7 +251,10 @@ ShaderView shader_view(const VoxelIndex& size, int up) {
   return view;
 }
 
-uint64_t shader_elements(const Proxy& proxy) { return proxy.voxels.words().size() + proxy.palette.size(); }
+uint64_t shader_elements(const Proxy& proxy) {
+  return proxy.voxels.words().size() + kLevelArrays.size() * proxy.voxels.levels() + proxy.palette.size() +
+         kShaderAoRays;
+}
 
 std::string voxel_shader(const Proxy& proxy, const ShaderView& view, const ShaderConfig& config) {
   if (shader_elements(proxy) > config.max_elements)

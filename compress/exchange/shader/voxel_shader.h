@@ -29,10 +29,10 @@ ShaderView shader_view(const VoxelIndex& size, int up);
 
 /// One self-contained shader: the stream as a constant array, its decoder, a tracer that skips empty cells, ambient
 /// occlusion and the palette. Colours are encoded with a square root.
-/// Throws Error(kLimitExceeded) if the arrays have more than config.max_elements elements of 32 bits.
+/// Throws Error(kLimitExceeded) if the arrays have more than config.max_elements elements.
 std::string voxel_shader(const Proxy& proxy, const ShaderView& view, const ShaderConfig& config);
 
-/// Elements of the arrays of voxel_shader().
+/// Elements of all arrays of voxel_shader(), as kMaxShaderElements counts them.
 uint64_t shader_elements(const Proxy& proxy);
 
 } // namespace packtrace

@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <regex>
 #include <span>
 #include <string>
 #include <vector>
@@ -111,6 +112,18 @@ TEST(VoxelShader, BothFormsCompile) {
                                  folder.path() / "fragment.spv"));
   EXPECT_TRUE(test::compile_glsl(
       folder.path(), test::shadertoy_program(voxel_shader(proxy, view, {ShaderForm::kShadertoy, 4096})), "frag", {}));
+}
+
+TEST(VoxelShader, EveryEntryOfEveryArrayIsAnElement) {
+  for (const uint32_t colors : {0u, 7u}) {
+    const Proxy proxy = proxy_of({}, 24, colors);
+    const std::string text = voxel_shader(proxy, shader_view(proxy.voxels.size(), 1), {ShaderForm::kShadertoy, 4096});
+    uint64_t sum = 0;
+    const std::regex array("ARRAY \\w+ \\w+\\[(\\d+)\\]");
+    for (std::sregex_iterator at(text.begin(), text.end(), array), end; at != end; ++at) sum += std::stoull((*at)[1]);
+    EXPECT_EQ(shader_elements(proxy), sum);
+    EXPECT_GT(sum, proxy.voxels.words().size() + kShaderAoRays + colors);
+  }
 }
 
 TEST(VoxelShader, TheLimitOfElementsIsKept) {
