@@ -60,6 +60,15 @@ public:
   double linear_view_z(DVec3 world) const { return transform_point(camera_from_world_, world).z * depth_scale_; }
 
   Projection projection() const { return projection_; }
+  const DAffine& world_from_camera() const { return world_from_camera_; }
+  /// Film coordinates of the (shifted) centres of a column or row of pixels; not for environment cameras. Rays of
+  /// perspective cameras lead from the origin of camera space through (film_x, film_y, 1).
+  double film_x(uint32_t x) const {
+    return window_.x + (x + 0.5 + offset_px_.x) / size_.width * (window_.y - window_.x);
+  }
+  double film_y(uint32_t y) const {
+    return window_.w + (y + 0.5 + offset_px_.y) / size_.height * (window_.z - window_.w);
+  }
   /// Origin of the rays in world space; for orthographic cameras, the origin of camera space.
   DVec3 eye() const { return world_from_camera_[3]; }
   /// World-space length that the central pixel covers at distance 1 from the eye, or at any distance for orthographic
@@ -79,8 +88,7 @@ private:
 };
 
 inline CameraRay PrimaryCamera::linear_ray(uint32_t x, uint32_t y) const {
-  const double u = (x + 0.5 + offset_px_.x) / size_.width, v = (y + 0.5 + offset_px_.y) / size_.height;
-  const DVec3 film(window_.x + u * (window_.y - window_.x), window_.w + v * (window_.z - window_.w), 0.0);
+  const DVec3 film(film_x(x), film_y(y), 0.0);
   const bool perspective = projection_ == Projection::kPerspective;
   const DVec3 origin = perspective ? DVec3(0.0) : film;
   const DVec3 direction = perspective ? DVec3(film.x, film.y, 1.0) : DVec3(0.0, 0.0, 1.0);

@@ -50,7 +50,7 @@ void write_directions(size_t count, const float* u, const float* v, VectorArrays
 
 } // namespace
 
-void ShadingPoints::load(const GBuffer& g, const PixelSampler& sampler, const UnitSpace& space, float offset_scale) {
+void ShadingPoints::load_surfaces(const GBuffer& g, const UnitSpace& space, float offset_scale) {
   const size_t n = pixel_.size();
   for (Vectors* vectors : {&origin_, &geometric_, &normal_, &direction_}) vectors->resize(n);
   offset_.resize(n), u_.resize(n), v_.resize(n), sampled_.resize(n);
@@ -66,13 +66,12 @@ void ShadingPoints::load(const GBuffer& g, const PixelSampler& sampler, const Un
   lift_origins(n, {origin_.x.data(), origin_.y.data(), origin_.z.data()},
                {geometric_.x.data(), geometric_.y.data(), geometric_.z.data()}, offset_.data(), space.centre(),
                space.scale());
-  sampler.pixels(x_px_.data(), y_px_.data(), n, sampled_);
 }
 
-void ShadingPoints::copy_to(std::span<OcclusionPoint> out) const {
+void ShadingPoints::copy_to(size_t first, std::span<OcclusionPoint> out) const {
   const auto at = [](const Vectors& v, size_t i) { return Vec3(v.x[i], v.y[i], v.z[i]); };
-  for (size_t i = 0; i < pixel_.size(); ++i)
-    out[i] = {at(origin_, i), at(geometric_, i), at(normal_, i), pixel_[i], x_px_[i], y_px_[i]};
+  for (size_t i = first; i < first + out.size(); ++i)
+    out[i - first] = {at(origin_, i), at(geometric_, i), at(normal_, i), pixel_[i], x_px_[i], y_px_[i]};
 }
 
 void ShadingPoints::write_rays(const PixelSampler& sampler, std::span<const uint32_t> samples, float tfar,

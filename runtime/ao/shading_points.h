@@ -23,11 +23,16 @@ public:
 
   /// Loads the surfaces of the pixels that were added.
   /// @param offset_scale AoConfig::offset_scale
-  void load(const GBuffer& gbuffer, const PixelSampler& sampler, const UnitSpace& space, float offset_scale);
+  void load(const GBuffer& gbuffer, const PixelSampler& sampler, const UnitSpace& space, float offset_scale) {
+    load_surfaces(gbuffer, space, offset_scale);
+    sampler.pixels(x_px_.data(), y_px_.data(), count(), sampled_);
+  }
+  /// Does the same for copy_to() only.
+  void load_surfaces(const GBuffer& gbuffer, const UnitSpace& space, float offset_scale);
 
   /// Copies what was loaded, for tracers that make rays themselves.
-  /// @param out count() elements
-  void copy_to(std::span<OcclusionPoint> out) const;
+  /// @param first of the points to copy, which out has room for
+  void copy_to(size_t first, std::span<OcclusionPoint> out) const;
 
   /// Writes the rays of the first rays.size() points. Directions are cosine-weighted about the shading normal; those
   /// below the geometric surface are mirrored to its upper side.

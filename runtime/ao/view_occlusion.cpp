@@ -1,10 +1,13 @@
 #include "runtime/ao/view_occlusion.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <numeric>
 #include <utility>
 #include <vector>
 
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/task_arena.h>
 
 #include "runtime/ao/hash.h"
 #include "runtime/ao/shading_points.h"
@@ -14,45 +17,65 @@
 namespace packtrace {
 namespace {
 
-/// The points of a picture's tiles, one vector per tile in rows.
+/// The points of a picture: tile by tile in rows, and in Morton order within tiles.
 class TilePoints {
 public:
-  TilePoints(const GBuffer& gbuffer, const SamplePlan& plan)
-      : gbuffer_(gbuffer), plan_(plan), columns_((gbuffer.size.width + kTileSize - 1) / kTileSize),
-        tiles_(size_t{columns_} * ((gbuffer.size.height + kTileSize - 1) / kTileSize)) {}
-
-  /// Fills a tile, in Morton order; resets the pixels that get no samples.
-  void fill(const Tile& tile, const PixelSampler& sampler, const UnitSpace& space, float offset_scale,
-            ShadingPoints& points, AoFrame& ao) {
-    points.clear();
-    for (uint32_t code = 0; code < kTileSize * kTileSize; ++code) {
-      const uint32_t x = tile.x0 + morton_even_bits(code), y = tile.y0 + morton_even_bits(code >> 1);
-      if (x >= tile.x1 || y >= tile.y1) continue;
-      const uint32_t pixel = y * gbuffer_.size.width + x;
-      if (gbuffer_.instance[pixel] != kNoInstance && (!plan_.colour || ((x + y) & 1u) == *plan_.colour)) {
-        points.add(x, y, pixel);
-      } else {
-        ao.ao[pixel] = kInvalidAo;
-        ao.hit_distance[pixel] = 0.0f;
-      }
-    }
-    points.load(gbuffer_, sampler, space, offset_scale);
-    std::vector<OcclusionPoint>& out = tiles_[size_t{tile.y0 / kTileSize} * columns_ + tile.x0 / kTileSize];
-    out.resize(points.count());
-    points.copy_to(out);
+  TilePoints(const GBuffer& gbuffer, const SamplePlan& plan, const UnitSpace& space, float offset_scale)
+      : gbuffer_(gbuffer), plan_(plan), space_(space), offset_scale_(offset_scale),
+        columns_((gbuffer.size.width + kTileSize - 1) / kTileSize),
+        first_(size_t{columns_} * ((gbuffer.size.height + kTileSize - 1) / kTileSize) + 1) {
+    for_each_tile(gbuffer_.size, quiet_, [&](const Tile& tile) { first_[number_of(tile) + 1] = count_in(tile); });
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
   }
 
-  std::vector<OcclusionPoint> all() const {
-    std::vector<OcclusionPoint> points;
-    for (const std::vector<OcclusionPoint>& tile : tiles_) points.insert(points.end(), tile.begin(), tile.end());
-    return points;
+  size_t count() const { return first_.back(); }
+  bool has_point(uint32_t x, uint32_t y) const {
+    return gbuffer_.instance[size_t{y} * gbuffer_.size.width + x] != kNoInstance &&
+           (!plan_.colour || ((x + y) & 1u) == *plan_.colour);
+  }
+
+  /// Writes points [first, first + out.size()).
+  void write(size_t first, std::span<OcclusionPoint> out) {
+    // Callers may hold locks, so the thread must not take up other work while it waits.
+    tbb::this_task_arena::isolate([&] {
+      for_each_tile(gbuffer_.size, quiet_, [&](const Tile& tile) {
+        const size_t number = number_of(tile), tile_first = first_[number];
+        const size_t begin = std::max(first, tile_first), end = std::min(first + out.size(), first_[number + 1]);
+        if (begin >= end) return;
+        ShadingPoints& points = memory_.local();
+        load(tile, points);
+        points.copy_to(begin - tile_first, out.subspan(begin - first, end - begin));
+      });
+    });
   }
 
 private:
+  size_t number_of(const Tile& tile) const { return size_t{tile.y0 / kTileSize} * columns_ + tile.x0 / kTileSize; }
+
+  size_t count_in(const Tile& tile) const {
+    size_t count = 0;
+    for (uint32_t y = tile.y0; y < tile.y1; ++y)
+      for (uint32_t x = tile.x0; x < tile.x1; ++x) count += has_point(x, y) ? 1 : 0;
+    return count;
+  }
+
+  void load(const Tile& tile, ShadingPoints& points) const {
+    points.clear();
+    for (uint32_t code = 0; code < kTileSize * kTileSize; ++code) {
+      const uint32_t x = tile.x0 + morton_even_bits(code), y = tile.y0 + morton_even_bits(code >> 1);
+      if (x < tile.x1 && y < tile.y1 && has_point(x, y)) points.add(x, y, y * gbuffer_.size.width + x);
+    }
+    points.load_surfaces(gbuffer_, space_, offset_scale_);
+  }
+
   const GBuffer& gbuffer_;
   const SamplePlan& plan_;
+  const UnitSpace& space_;
+  const float offset_scale_;
   const uint32_t columns_;
-  std::vector<std::vector<OcclusionPoint>> tiles_;
+  std::vector<size_t> first_; ///< number of the first point, by tile; then of all
+  tbb::enumerable_thread_specific<ShadingPoints> memory_;
+  Progress quiet_; ///< points are made within a fraction of the time
 };
 
 OcclusionSamples samples_of(const AoConfig& config, const SamplePlan& plan, float radius, const UnitSpace& space) {
@@ -80,29 +103,32 @@ bool traces_view_occlusion(const ViewTracer& tracer, const AoConfig& config, con
 uint64_t trace_view_occlusion(const ViewTracer& tracer, const UnitSpace& space, const GBuffer& gbuffer,
                               const AoConfig& config, float radius, const SamplePlan& plan, AoFrame& ao,
                               Progress& progress) {
-  const PixelSampler sampler(config.sampler, config.seed, config.sampler_block);
-  TilePoints tiles(gbuffer, plan);
-  tbb::enumerable_thread_specific<ShadingPoints> memory;
-  Progress quiet; // the points are made within a fraction of the time
-  for_each_tile(gbuffer.size, quiet,
-                [&](const Tile& tile) { tiles.fill(tile, sampler, space, config.offset_scale, memory.local(), ao); });
-  const std::vector<OcclusionPoint> points = tiles.all();
-  progress.advance(gbuffer.size.pixels() - points.size());
+  TilePoints tiles(gbuffer, plan, space, config.offset_scale);
+  const size_t count = tiles.count();
+  progress.advance(gbuffer.size.pixels() - count);
   const OcclusionSamples samples = samples_of(config, plan, radius, space);
   if (ao.may_stay_on_gpu) {
+    const OcclusionPoints points{count, [&](size_t first, std::span<OcclusionPoint> out) { tiles.write(first, out); }};
     ao.on_gpu = tracer.leave_occlusion(points, samples, {gbuffer.size.pixels(), double{radius}}, std::move(ao.on_gpu),
                                        progress);
-    return points.size() * uint64_t{plan.count};
+    return count * uint64_t{plan.count};
   }
   ao.on_gpu = nullptr;
-  std::vector<OcclusionSums> sums(points.size());
-  tracer.trace_occlusion(points, samples, sums, progress);
+  std::vector<OcclusionPoint> points(count);
+  tiles.write(0, points);
+  std::vector<OcclusionSums> sums(count);
+  const auto copy = [&](size_t first, std::span<OcclusionPoint> out) {
+    std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(first), out.size(), out.begin());
+  };
+  tracer.trace_occlusion({count, copy}, samples, sums, progress);
+  std::ranges::fill(ao.ao, kInvalidAo);
+  std::ranges::fill(ao.hit_distance, 0.0f);
   const double per_sample = 1.0 / plan.count;
-  for (size_t i = 0; i < points.size(); ++i) {
+  for (size_t i = 0; i < count; ++i) {
     ao.ao[points[i].pixel] = static_cast<float>(sums[i].visibility * per_sample);
     ao.hit_distance[points[i].pixel] = static_cast<float>(sums[i].distance * per_sample * double{radius});
   }
-  return points.size() * uint64_t{plan.count};
+  return count * uint64_t{plan.count};
 }
 
 } // namespace packtrace

@@ -43,6 +43,21 @@ public:
 
   /// Traces all rays of the picture at once; trace_tile() then uses these hits.
   void trace_view(const ViewTracer& tracer, const Progress& progress) {
+    out_.on_gpu = tracer.trace_camera(now_, kCameraRays, std::move(out_.on_gpu), progress);
+    if (out_.on_gpu)
+      pixel_hits_ = tracer.hits(*out_.on_gpu);
+    else
+      trace_spans(tracer, progress);
+  }
+
+  void trace_tile(const Tile& tile) const {
+    RayBatch batch;
+    for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) trace_row(y, tile, batch);
+  }
+
+private:
+  /// Makes the rays here.
+  void trace_spans(const ViewTracer& tracer, const Progress& progress) {
     const ImageSize size = out_.size;
     const size_t columns = (size.width + kTileSize - 1) / kTileSize, rows = (size.height + kTileSize - 1) / kTileSize;
     std::vector<Ray> rays(columns * rows * kTileRows * kBatch, Ray{Vec3(0), 0.0f, Vec3(0, 0, 1), -1.0f});
@@ -58,18 +73,24 @@ public:
     tracer.trace_view(rays, kCameraRays, view_hits_, progress);
   }
 
-  void trace_tile(const Tile& tile) const {
-    RayBatch batch;
-    for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) trace_row(y, tile, batch);
+  void find_hits(uint32_t y0, const Tile& tile, RayBatch& batch) const {
+    if (!view_hits_.empty()) {
+      std::copy_n(&view_hits_[place_of(y0, tile)], batch.count, batch.hits);
+    } else if (!pixel_hits_.empty()) {
+      for (uint32_t i = 0; i < batch.count; ++i)
+        batch.hits[i] = is_inside(i, tile, batch) ? pixel_hits_[pixel_of(i, batch)] : RayHit{};
+    } else {
+      tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});
+    }
   }
 
-private:
+  static bool is_inside(uint32_t i, const Tile& tile, const RayBatch& batch) {
+    return batch.columns.x[i] < tile.x1 && batch.columns.y[i] < tile.y1;
+  }
+
   void trace_row(uint32_t y0, const Tile& tile, RayBatch& batch) const {
     make_rays(y0, tile, batch);
-    if (view_hits_.empty())
-      tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});
-    else
-      std::copy_n(&view_hits_[place_of(y0, tile)], batch.count, batch.hits);
+    find_hits(y0, tile, batch);
     batch.hit_count = 0;
     for (uint32_t i = 0; i < batch.count; ++i) {
       if (batch.hits[i].valid())
@@ -80,8 +101,7 @@ private:
     source_.look_up({batch.places, batch.hit_count}, {batch.attributes, batch.hit_count});
     place_hits(batch);
     for (uint32_t i = 0; i < batch.count; ++i)
-      if (!batch.hits[i].valid() && batch.columns.x[i] < tile.x1 && batch.columns.y[i] < tile.y1)
-        write_miss(pixel_of(i, batch));
+      if (!batch.hits[i].valid() && is_inside(i, tile, batch)) write_miss(pixel_of(i, batch));
     for (uint32_t h = 0; h < batch.hit_count; ++h) write_hit(h, batch);
   }
 
@@ -101,7 +121,7 @@ private:
     write_rays(now_, space_, batch.count, c);
     for (uint32_t i = 0; i < batch.count; ++i) {
       CameraRay ray{c.origin.at(i), c.direction.at(i)};
-      const bool traced = approach_scene(ray) && c.x[i] < tile.x1 && c.y[i] < tile.y1;
+      const bool traced = approach_scene(ray) && is_inside(i, tile, batch);
       c.origin.set(i, ray.origin);
       batch.rays[i] = {Vec3(ray.origin), 0.0f, Vec3(ray.direction),
                        traced ? std::numeric_limits<float>::infinity() : -1.0f};
@@ -219,13 +239,14 @@ private:
   const SurfaceMotion motion_;
   const TextureFilter textures_;
   GBuffer& out_;
-  std::vector<RayHit> view_hits_; ///< of trace_view()
+  std::vector<RayHit> view_hits_;      ///< of trace_spans()
+  std::span<const RayHit> pixel_hits_; ///< of out_.on_gpu, by pixel
 };
 
 } // namespace
 
 bool approach_scene(CameraRay& ray) {
-  constexpr double kNear = 4.0 * UnitSpace::kHalfSize; // the corners of the scene's box lie within sqrt(3) kHalfSize
+  constexpr double kNear = UnitSpace::kNear;
   if (glm::dot(ray.origin, ray.origin) <= kNear * kNear) return true;
   const double closest = -glm::dot(ray.origin, ray.direction);
   const DVec3 point = ray.origin + ray.direction * closest;
@@ -249,7 +270,10 @@ void trace_primary(const SceneSource& source, const RayTracer& tracer, const Pri
   PrimaryTracer primary(source, tracer, now, previous, textures, gbuffer);
   gbuffer.previous_z.resize(primary.sees_motion() ? now.size().pixels() : 0);
   progress.begin("primary rays", now.size().pixels());
-  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer)) primary.trace_view(*view, progress);
+  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer))
+    primary.trace_view(*view, progress);
+  else
+    gbuffer.on_gpu = nullptr;
   for_each_tile(now.size(), progress, [&](const Tile& tile) { primary.trace_tile(tile); });
 }
 

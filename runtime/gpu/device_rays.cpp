@@ -8,6 +8,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/gpu/device/staged_buffer.h"
 #include "runtime/gpu/device_ao.h"
+#include "runtime/gpu/device_view.h"
 #include "runtime/gpu/gpu_scene_state.h"
 #include "runtime/gpu/shaders/spirv.h"
 
@@ -25,7 +26,12 @@ constexpr uint32_t kMaxNearestSamples = 16;
 
 uint32_t groups_of(uint64_t threads) { return static_cast<uint32_t>((threads + kThreads - 1) / kThreads); }
 
-uint32_t blocks_of(const CameraRecord& camera) { return (camera.width + 7) / 8 * ((camera.height + 3) / 4); }
+uint32_t blocks_of(uint32_t width, uint32_t height) { return (width + 7) / 8 * ((height + 3) / 4); }
+
+void require_few_pixels(uint32_t width, uint32_t height) {
+  if ((uint64_t{width} + 8) * (uint64_t{height} + 8) > kMaxPoints)
+    throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 pixels; use a smaller picture");
+}
 
 /// Sizes of dispatches. Parts of a picture differ in cost, so the slowest dispatch of late decides.
 struct Pace {
@@ -94,9 +100,9 @@ struct DeviceRays::State {
   std::shared_ptr<Device> device;
   CameraRecord camera{};
   Buffer cameras, hits, rays, counts, sums;
-  StagedBuffer points;
+  StagedBuffer points, view, film;
   uint32_t point_count = 0;
-  std::unique_ptr<Kernel> camera_kernel, points_kernel, rays_kernel, queue_kernel, nearest_kernel;
+  std::unique_ptr<Kernel> camera_kernel, view_kernel, points_kernel, rays_kernel, queue_kernel, nearest_kernel;
   std::unique_ptr<Kernel> picture_kernel;
   uint64_t placed = 0;                                          ///< GpuScene::State::placed of the kernels
   std::vector<uint32_t> constants;                              ///< GpuScene::State::constants of the kernels
@@ -122,7 +128,7 @@ struct DeviceRays::State {
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
     const bool same = std::exchange(constants, scene.constants) == scene.constants;
-    for (auto* kernel : {&camera_kernel, &points_kernel, &rays_kernel, &queue_kernel, &nearest_kernel})
+    for (auto* kernel : {&camera_kernel, &view_kernel, &points_kernel, &rays_kernel, &queue_kernel, &nearest_kernel})
       if (same && *kernel)
         scene.bind_scene(**kernel);
       else
@@ -138,8 +144,7 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   s.follow_scene();
   s.camera = camera;
   const uint64_t pixels = uint64_t{camera.width} * camera.height;
-  if ((uint64_t{camera.width} + 8) * (uint64_t{camera.height} + 8) > kMaxPoints)
-    throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 pixels; use a smaller picture");
+  require_few_pixels(camera.width, camera.height);
   s.make_room(s.hits, pixels * sizeof(packed::KernelHit), "hits");
   s.make_room(s.rays, keep_rays ? pixels * sizeof(packed::KernelRay) : 1, "rays");
   s.cameras = upload(s.device, push_bytes(camera), "the camera");
@@ -147,17 +152,18 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.camera_kernel->bind(kFirstBinding + i, *buffers[i]);
   TimedDispatches dispatches(*s.device, s.camera_pace, 1, s.most_threads(), {});
-  return dispatches.all(uint64_t{blocks_of(camera)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
-    const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), baked::kVisibleToCamera,
-                          keep_rays ? 1u : 0u};
-    return s.device->run(*s.camera_kernel, push_bytes(span), groups_of(count));
-  });
+  return dispatches.all(uint64_t{blocks_of(camera.width, camera.height)} * 32, kThreads,
+                        [&](uint64_t first, uint64_t count) {
+                          const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count),
+                                                baked::kVisibleToCamera, keep_rays ? 1u : 0u};
+                          return s.device->run(*s.camera_kernel, push_bytes(span), groups_of(count));
+                        });
 }
 
 void DeviceRays::make_points(float lift) {
   State& s = *state_;
   s.follow_scene();
-  s.point_count = blocks_of(s.camera) * 32;
+  s.point_count = blocks_of(s.camera.width, s.camera.height) * 32;
   s.make_room_for_points();
   if (!s.points_kernel)
     s.points_kernel = s.scene.make_kernel(spirv::surface_points(), kFirstBinding + 4, sizeof(SpanRecord));
@@ -170,15 +176,52 @@ void DeviceRays::make_points(float lift) {
   }
 }
 
-void DeviceRays::set_points(std::span<const PointRecord> points) {
+std::shared_ptr<DeviceView> DeviceRays::trace_view(const ViewRecord& view, std::span<const double> film,
+                                                   uint32_t ray_class, std::shared_ptr<DeviceView> reused,
+                                                   const Watch& watch) {
   State& s = *state_;
-  if (points.size() > kMaxPoints)
-    throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 points at once; use a smaller picture");
-  s.point_count = static_cast<uint32_t>(points.size());
-  s.make_room_for_points();
+  s.follow_scene();
+  require_few_pixels(view.width, view.height);
+  const size_t pixels = size_t{view.width} * view.height;
+  if (!reused || reused->pixels() != pixels || reused->device() != s.device) {
+    reused.reset();
+    reused = std::make_shared<DeviceView>(s.device, pixels);
+  }
+  if (s.view.bytes() == 0) s.view = StagedBuffer(s.device, sizeof view, "the camera");
+  if (s.film.bytes() < film.size_bytes()) s.film = StagedBuffer(s.device, film.size_bytes(), "the camera's film");
   Commands commands;
-  s.points.write(commands, std::as_bytes(points));
+  s.view.write(commands, push_bytes(view));
+  s.film.write(commands, std::as_bytes(film));
   s.device->run(commands);
+  if (!s.view_kernel) s.view_kernel = s.scene.make_kernel(spirv::view(), kFirstBinding + 3, sizeof(SpanRecord));
+  const StagedBuffer& hits = reused->hits_buffer();
+  const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &hits.device()};
+  for (uint32_t i = 0; i < std::size(buffers); ++i) s.view_kernel->bind(kFirstBinding + i, *buffers[i]);
+  TimedDispatches dispatches(*s.device, s.camera_pace, 1, s.most_threads(), watch);
+  dispatches.all(uint64_t{blocks_of(view.width, view.height)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
+    const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), ray_class, 0};
+    return s.device->run(*s.view_kernel, push_bytes(span), groups_of(count));
+  });
+  s.device->copy(hits.device(), hits.host(), 0, 0, pixels * sizeof(packed::KernelHit));
+  return reused;
+}
+
+void DeviceRays::set_points(size_t count, const std::function<void(std::span<PointRecord>)>& write) {
+  State& s = *state_;
+  if (count > kMaxPoints)
+    throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 points at once; use a smaller picture");
+  s.point_count = static_cast<uint32_t>(count);
+  s.make_room_for_points();
+  write({s.points.host().as<PointRecord>(), count});
+  Commands commands;
+  commands.copy(s.points.host(), s.points.device(), count * sizeof(PointRecord));
+  s.device->run(commands);
+}
+
+void DeviceRays::set_points(std::span<const PointRecord> points) {
+  set_points(points.size(), [&](std::span<PointRecord> out) {
+    copy_in_parts(reinterpret_cast<std::byte*>(out.data()), std::as_bytes(points).data(), points.size_bytes());
+  });
 }
 
 void DeviceRays::release() { state_->points = StagedBuffer(), state_->counts = Buffer(), state_->sums = Buffer(); }

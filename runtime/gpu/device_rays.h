@@ -10,6 +10,7 @@
 namespace packtrace::gpu {
 
 class DeviceAo;
+class DeviceView;
 
 /// Device time of some dispatches, in ms.
 struct DeviceTime {
@@ -30,11 +31,20 @@ public:
   DeviceTime trace_camera(const CameraRecord& camera, bool keep_rays);
   /// Makes a point of each pixel that was hit, lifted off its surface by a length of unit space.
   void make_points(float lift);
-  /// Uses other points, which lie on surfaces of the scene. Throws Error(kLimitExceeded) for more than 2^31.
-  void set_points(std::span<const PointRecord> points);
-
   /// Called before each dispatch with the share of the call's work that is done; may throw.
   using Watch = std::function<void(double share)>;
+
+  /// Traces the rays of all pixels of a camera and reads their hits back.
+  /// @param film PrimaryCamera::film_x() of all columns, then film_y() of all rows
+  /// @param reused a picture whose memory may be used, or null
+  std::shared_ptr<DeviceView> trace_view(const ViewRecord& view, std::span<const double> film, uint32_t ray_class,
+                                         std::shared_ptr<DeviceView> reused, const Watch& watch);
+
+  /// Uses other points, which lie on surfaces of the scene. Throws Error(kLimitExceeded) for more than 2^31.
+  /// @param write writes all points; it must not read them
+  void set_points(size_t count, const std::function<void(std::span<PointRecord>)>& write);
+  /// Does the same with points that are there.
+  void set_points(std::span<const PointRecord> points);
 
   /// Whether the device can run count_occluded(): subgroups of 4 to 32 lanes, and at most 2^24 nodes.
   bool can_count() const;

@@ -44,6 +44,10 @@ public:
   /// Outer lengths per unit-space length.
   double inverse_scale() const { return inverse_scale_; }
 
+  /// Rays that start within this distance of the unit space's origin are traced from there, others from about it; the
+  /// corners of the scene's box lie within sqrt(3) kHalfSize.
+  static constexpr double kNear = 4.0 * kHalfSize;
+
   bool operator==(const UnitSpace&) const = default;
 
   DAffine unit_from_outer() const { return uniform(scale_, -centre_ * scale_); }

@@ -2,17 +2,20 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {
 
 namespace gpu {
 class DeviceAo;
-}
+class DeviceView;
+} // namespace gpu
 
 /// A surface point from which occlusion rays start, in a tracer's space().
 struct OcclusionPoint {
@@ -21,6 +24,13 @@ struct OcclusionPoint {
   Vec3 normal; ///< shading normal, unit length
   uint32_t pixel = 0;
   uint32_t x_px = 0, y_px = 0;
+};
+
+/// Points that are written where a tracer wants them.
+struct OcclusionPoints {
+  size_t count = 0;
+  /// Writes points [first, first + out.size()). It may use all cores.
+  std::function<void(size_t first, std::span<OcclusionPoint> out)> write;
 };
 
 /// The samples of all points: of SamplerKind::kSpaceTimeNet, directed as ShadingPoints::write_rays() does.
@@ -55,19 +65,29 @@ public:
   virtual void trace_view(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                           const Progress& progress) const = 0;
 
+  /// Makes the rays of all pixels of a camera and traces them: the bits of PrimaryCamera::linear_ray() and
+  /// approach_scene(). Returns null for environment cameras, and if there is no memory for a whole picture.
+  /// @param reused a picture whose memory may be used, or null
+  virtual std::shared_ptr<gpu::DeviceView> trace_camera(const PrimaryCamera& camera, uint32_t ray_class,
+                                                        std::shared_ptr<gpu::DeviceView> reused,
+                                                        const Progress& progress) const = 0;
+  /// The hits of such a picture, one per pixel. Valid until its memory is used again.
+  virtual std::span<const RayHit> hits(const gpu::DeviceView& picture) const = 0;
+
   /// Makes the occlusion rays of all points and sums up what they meet: the bits that trace_ao() computes from spans of
   /// rays.
   /// @param sums as many as points
   /// @param progress advances by the number of points
-  virtual void trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+  virtual void trace_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples,
                                std::span<OcclusionSums> sums, Progress& progress) const = 0;
 
   /// Does the same, and leaves the points' means in a picture on the device: AO, or -1 where there is no point, and hit
   /// distances, or 0.
   /// @param reused a picture whose memory may be used, or null
-  virtual std::shared_ptr<gpu::DeviceAo>
-  leave_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
-                  const OcclusionPicture& picture, std::shared_ptr<gpu::DeviceAo> reused, Progress& progress) const = 0;
+  virtual std::shared_ptr<gpu::DeviceAo> leave_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples,
+                                                         const OcclusionPicture& picture,
+                                                         std::shared_ptr<gpu::DeviceAo> reused,
+                                                         Progress& progress) const = 0;
   /// Reads such a picture, one entry per pixel.
   virtual void read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao,
                               std::span<float> hit_distance) const = 0;

@@ -56,6 +56,16 @@ struct CameraRecord {
   uint32_t width, height;
 };
 
+/// A camera whose rays have the bits of PrimaryCamera::linear_ray() and approach_scene().
+struct ViewRecord {
+  double linear[9];               ///< of world_from_camera, by column
+  double eye[3];                  ///< its translation
+  double centre[3], scale, near_; ///< of the unit space: UnitSpace::kNear
+  uint32_t width, height;
+  uint32_t orthographic; ///< 1, or 0: perspective
+  uint32_t reserved;
+};
+
 /// A surface point from which occlusion rays start, in unit space.
 struct PointRecord {
   float origin[3]; ///< lifted off the surface

@@ -112,6 +112,18 @@ inline constexpr std::array kCameraFields = {
     GlslField{"uint", "height", offsetof(CameraRecord, height)},
 };
 
+inline constexpr std::array kViewFields = {
+    GlslField{"double", "linear", offsetof(ViewRecord, linear), 9},
+    GlslField{"double", "eye", offsetof(ViewRecord, eye), 3},
+    GlslField{"double", "centre", offsetof(ViewRecord, centre), 3},
+    GlslField{"double", "scale", offsetof(ViewRecord, scale)},
+    GlslField{"double", "near_", offsetof(ViewRecord, near_)},
+    GlslField{"uint", "width", offsetof(ViewRecord, width)},
+    GlslField{"uint", "height", offsetof(ViewRecord, height)},
+    GlslField{"uint", "orthographic", offsetof(ViewRecord, orthographic)},
+    GlslField{"uint", "reserved", offsetof(ViewRecord, reserved)},
+};
+
 inline constexpr std::array kPointFields = {
     GlslField{"float", "origin", offsetof(PointRecord, origin), 3},
     GlslField{"float", "up", offsetof(PointRecord, up), 3},
@@ -192,6 +204,7 @@ inline constexpr std::array kRecords = {
     GlslRecord{"SceneRecord", sizeof(SceneRecord), kSceneFields},
     GlslRecord{"SpanRecord", sizeof(SpanRecord), kSpanFields},
     GlslRecord{"CameraRecord", sizeof(CameraRecord), kCameraFields},
+    GlslRecord{"ViewRecord", sizeof(ViewRecord), kViewFields},
     GlslRecord{"PointRecord", sizeof(PointRecord), kPointFields},
     GlslRecord{"OcclusionRecord", sizeof(OcclusionRecord), kOcclusionFields},
     GlslRecord{"OcclusionImageRecord", sizeof(OcclusionImageRecord), kOcclusionImageFields},

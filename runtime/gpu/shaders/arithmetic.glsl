@@ -81,3 +81,22 @@ double double_difference(double a, double b, double c, double d) {
   precise double sum = difference + (error + (ab_rest - cd_rest));
   return sum;
 }
+
+// A quotient and a square root of doubles that are neither zero nor extreme, with the last bit right also where the
+// device's are off by one.
+double refined_quotient(double a, double b) {
+  precise double q = a / b;
+  if (kFusedDoubles && q != 0.0lf) {
+    precise double rest = fma(-q, b, a), y = 1.0lf / b;
+    q = fma(rest, y, q);
+  }
+  return q;
+}
+double refined_root(double x) {
+  precise double root = sqrt(x);
+  if (kFusedDoubles && x > 0.0lf) {
+    precise double rest = fma(-root, root, x), half_over = 0.5lf / root;
+    root = fma(rest, half_over, root);
+  }
+  return root;
+}

@@ -18,6 +18,9 @@ constexpr uint32_t kPrepare[] = {
 constexpr uint32_t kCamera[] = {
 #include <camera.inc>
 };
+constexpr uint32_t kView[] = {
+#include <view.inc>
+};
 constexpr uint32_t kCopy[] = {
 #include <copy.inc>
 };
@@ -77,6 +80,7 @@ std::span<const uint32_t> trace_any() { return kTraceAny; }
 std::span<const uint32_t> trace_closest() { return kTraceClosest; }
 std::span<const uint32_t> prepare() { return kPrepare; }
 std::span<const uint32_t> camera() { return kCamera; }
+std::span<const uint32_t> view() { return kView; }
 std::span<const uint32_t> copy() { return kCopy; }
 std::span<const uint32_t> surface_points() { return kSurfacePoints; }
 std::span<const uint32_t> occlusion_rays() { return kOcclusionRays; }

@@ -11,6 +11,7 @@ std::span<const uint32_t> trace_any();
 std::span<const uint32_t> trace_closest();
 std::span<const uint32_t> prepare();
 std::span<const uint32_t> camera();
+std::span<const uint32_t> view();
 std::span<const uint32_t> copy();
 std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();

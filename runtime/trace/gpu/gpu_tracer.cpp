@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/gpu/device_view.h"
 
 namespace packtrace {
 
@@ -32,6 +33,19 @@ gpu::OcclusionRecord occlusion_record(const OcclusionSamples& samples, uint32_t 
   record.tfar = samples.tfar, record.inverse_radius = samples.inverse_radius;
   record.lambda = samples.lambda, record.darkening = samples.darkening, record.end = samples.end;
   record.floor = samples.floor, record.scale = samples.scale, record.parabola = samples.parabola;
+  return record;
+}
+
+gpu::ViewRecord view_record(const PrimaryCamera& camera, const UnitSpace& space) {
+  const DAffine& place = camera.world_from_camera();
+  gpu::ViewRecord record{};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int column = 0; column < 3; ++column) record.linear[3 * column + axis] = place[column][axis];
+    record.eye[axis] = place[3][axis], record.centre[axis] = space.centre()[axis];
+  }
+  record.scale = space.scale(), record.near_ = UnitSpace::kNear;
+  record.width = camera.size().width, record.height = camera.size().height;
+  record.orthographic = camera.projection() == Projection::kOrthographic ? 1 : 0;
   return record;
 }
 
@@ -65,20 +79,43 @@ void GpuTracer::trace_view(std::span<const Ray> rays, uint32_t ray_class, std::s
                   [&] { progress.check_cancelled(); });
 }
 
+std::shared_ptr<gpu::DeviceView> GpuTracer::trace_camera(const PrimaryCamera& camera, uint32_t ray_class,
+                                                         std::shared_ptr<gpu::DeviceView> reused,
+                                                         const Progress& progress) const {
+  if (camera.projection() == Projection::kEnvironment) return nullptr;
+  const ImageSize size = camera.size();
+  std::vector<double> film(size_t{size.width} + size.height);
+  for (uint32_t x = 0; x < size.width; ++x) film[x] = camera.film_x(x);
+  for (uint32_t y = 0; y < size.height; ++y) film[size.width + y] = camera.film_y(y);
+  const std::lock_guard lock(device_rays_mutex_);
+  try {
+    return device_rays_->trace_view(view_record(camera, space()), film, ray_class, std::move(reused),
+                                    [&](double) { progress.check_cancelled(); });
+  } catch (const Error& error) { // spans of rays need less memory
+    if (error.kind() != ErrorKind::kLimitExceeded) throw;
+    return nullptr;
+  }
+}
+
+std::span<const RayHit> GpuTracer::hits(const gpu::DeviceView& picture) const {
+  const std::span<const packed::KernelHit> hits = picture.hits();
+  return {reinterpret_cast<const RayHit*>(hits.data()), hits.size()};
+}
+
 /// Traces the rays of all points, of as many at once as there is memory for.
-void GpuTracer::trace_parts(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
-                            const TakeSums& take, Progress& progress) const {
+void GpuTracer::trace_parts(const OcclusionPoints& points, const OcclusionSamples& samples, const TakeSums& take,
+                            Progress& progress) const {
   constexpr size_t kLeastPoints = 256;
-  size_t at_once = points.size();
+  size_t at_once = points.count;
   uint64_t reported = 0;
-  for (size_t first = 0; first < points.size();) {
-    const size_t count = std::min(points.size() - first, at_once);
+  for (size_t first = 0; first < points.count;) {
+    const size_t count = std::min(points.count - first, at_once);
     const auto report = [&](double share) {
       const auto done = std::max(reported, first + static_cast<uint64_t>(share * static_cast<double>(count)));
       progress.advance(done - std::exchange(reported, done));
     };
     try {
-      trace_part(points.subspan(first, count), samples, report);
+      trace_part(points, first, count, samples, report);
       take(first, count);
       report(1.0);
       first += count;
@@ -91,21 +128,23 @@ void GpuTracer::trace_parts(std::span<const OcclusionPoint> points, const Occlus
   }
 }
 
-/// Traces the rays of points for which there is memory, else throws Error(kLimitExceeded).
+/// Traces the rays of points [first, first + count) if there is memory for them, else throws Error(kLimitExceeded).
 /// @param report of the share that is done
-void GpuTracer::trace_part(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+void GpuTracer::trace_part(const OcclusionPoints& points, size_t first, size_t count, const OcclusionSamples& samples,
                            const std::function<void(double)>& report) const {
   const gpu::OcclusionRecord record = occlusion_record(samples, scene_->subgroup_size());
-  device_rays_->set_points({reinterpret_cast<const gpu::PointRecord*>(points.data()), points.size()});
+  device_rays_->set_points(count, [&](std::span<gpu::PointRecord> out) {
+    points.write(first, {reinterpret_cast<OcclusionPoint*>(out.data()), out.size()});
+  });
   if (samples.nearest)
     device_rays_->sum_nearest(record, report);
   else
     device_rays_->count_occluded(record, report);
 }
 
-void GpuTracer::trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+void GpuTracer::trace_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples,
                                 std::span<OcclusionSums> sums, Progress& progress) const {
-  assert(sums.size() == points.size());
+  assert(sums.size() == points.count);
   const std::lock_guard lock(device_rays_mutex_);
   const auto take = [&](size_t first, size_t count) {
     const std::span<OcclusionSums> out = sums.subspan(first, count);
@@ -123,7 +162,7 @@ void GpuTracer::trace_occlusion(std::span<const OcclusionPoint> points, const Oc
   trace_parts(points, samples, take, progress);
 }
 
-std::shared_ptr<gpu::DeviceAo> GpuTracer::leave_occlusion(std::span<const OcclusionPoint> points,
+std::shared_ptr<gpu::DeviceAo> GpuTracer::leave_occlusion(const OcclusionPoints& points,
                                                           const OcclusionSamples& samples,
                                                           const OcclusionPicture& picture,
                                                           std::shared_ptr<gpu::DeviceAo> reused,

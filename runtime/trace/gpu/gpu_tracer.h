@@ -33,11 +33,14 @@ public:
                 std::span<uint8_t> occluded) const override;
   void trace_view(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                   const Progress& progress) const override;
-  void trace_occlusion(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
-                       std::span<OcclusionSums> sums, Progress& progress) const override;
-  std::shared_ptr<gpu::DeviceAo> leave_occlusion(std::span<const OcclusionPoint> points,
-                                                 const OcclusionSamples& samples, const OcclusionPicture& picture,
-                                                 std::shared_ptr<gpu::DeviceAo> reused,
+  std::shared_ptr<gpu::DeviceView> trace_camera(const PrimaryCamera& camera, uint32_t ray_class,
+                                                std::shared_ptr<gpu::DeviceView> reused,
+                                                const Progress& progress) const override;
+  std::span<const RayHit> hits(const gpu::DeviceView& picture) const override;
+  void trace_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples, std::span<OcclusionSums> sums,
+                       Progress& progress) const override;
+  std::shared_ptr<gpu::DeviceAo> leave_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples,
+                                                 const OcclusionPicture& picture, std::shared_ptr<gpu::DeviceAo> reused,
                                                  Progress& progress) const override;
   void read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const override;
   bool traces_occlusion(bool nearest) const override { return nearest || device_rays_->can_count(); }
@@ -58,9 +61,9 @@ private:
   void upload(const GpuConfig& config);
   /// Takes the results of points [first, first + count) from the device.
   using TakeSums = std::function<void(size_t first, size_t count)>;
-  void trace_parts(std::span<const OcclusionPoint> points, const OcclusionSamples& samples, const TakeSums& take,
+  void trace_parts(const OcclusionPoints& points, const OcclusionSamples& samples, const TakeSums& take,
                    Progress& progress) const;
-  void trace_part(std::span<const OcclusionPoint> points, const OcclusionSamples& samples,
+  void trace_part(const OcclusionPoints& points, size_t first, size_t count, const OcclusionSamples& samples,
                   const std::function<void(double)>& report) const;
 
   PackedTracer packed_;

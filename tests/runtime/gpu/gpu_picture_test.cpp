@@ -25,6 +25,29 @@ protected:
     return gbuffer;
   }
 
+  /// Compares the G-buffers of both tracers. Returns that of the GPU.
+  GBuffer expect_same_surfaces(const GpuTracer& tracer, const PrimaryCamera& now, const PrimaryCamera& before) const {
+    GBuffer expected, gbuffer;
+    Progress progress;
+    trace_primary(baked_.source, tracer.packed(), now, before, expected, progress);
+    trace_primary(baked_.source, tracer, now, before, gbuffer, progress);
+    EXPECT_EQ(gbuffer.view_z, expected.view_z);
+    EXPECT_EQ(gbuffer.position, expected.position);
+    EXPECT_EQ(gbuffer.geometric_normal, expected.geometric_normal);
+    EXPECT_EQ(gbuffer.normal, expected.normal);
+    EXPECT_EQ(gbuffer.albedo, expected.albedo);
+    EXPECT_EQ(gbuffer.instance, expected.instance);
+    EXPECT_EQ(gbuffer.triangle, expected.triangle);
+    EXPECT_EQ(gbuffer.material, expected.material);
+    EXPECT_EQ(gbuffer.back_face, expected.back_face);
+    EXPECT_EQ(gbuffer.offset, expected.offset);
+    EXPECT_EQ(gbuffer.motion_px, expected.motion_px);
+    EXPECT_EQ(gbuffer.previous_z, expected.previous_z);
+    EXPECT_GT(std::ranges::count_if(expected.view_z, [](float z) { return z > 0.0f; }), 100);
+    for (const std::string& message : tracer.scene().validation_messages()) ADD_FAILURE() << message;
+    return gbuffer;
+  }
+
   /// Compares ambient occlusion of both tracers.
   /// @param on_device whether the device is to make the rays
   void expect_same_ao(const AoConfig& config, const SamplePlan& plan, bool on_device = true) const {
@@ -48,16 +71,30 @@ protected:
   const PrimaryCamera camera_;
 };
 
+/// Surfaces of all kinds of cameras.
 TEST_F(GpuPictureTest, PrimaryVisibility) {
   const GpuTracer tracer(baked_.file, baked_.source, config_);
-  const GBuffer expected = primary(tracer.packed()), gbuffer = primary(tracer);
-  EXPECT_EQ(gbuffer.view_z, expected.view_z);
-  EXPECT_EQ(gbuffer.position, expected.position);
-  EXPECT_EQ(gbuffer.normal, expected.normal);
-  EXPECT_EQ(gbuffer.instance, expected.instance);
-  EXPECT_EQ(gbuffer.triangle, expected.triangle);
-  EXPECT_EQ(gbuffer.offset, expected.offset);
-  EXPECT_GT(std::ranges::count_if(expected.view_z, [](float z) { return z > 0.0f; }), 500);
+  const GBuffer gbuffer = expect_same_surfaces(tracer, camera_, camera_);
+  ASSERT_NE(gbuffer.on_gpu, nullptr) << "the device did not make the rays";
+  EXPECT_GT(std::ranges::count_if(gbuffer.view_z, [](float z) { return z > 0.0f; }), 500);
+  // Other cameras whose rays the device makes: shifted within pixels, moving, scaled and mirrored, far away,
+  // orthographic.
+  Camera camera = test::camera_at({0.1, 3, -12}, {0, 1, 0});
+  const PrimaryCamera shifted(camera, kSize, {0.31, -0.27});
+  expect_same_surfaces(tracer, shifted, camera_);
+  camera.world_from_camera[0] *= -1.7, camera.world_from_camera[2] *= 0.3;
+  expect_same_surfaces(tracer, PrimaryCamera(camera, kSize), camera_);
+  Camera far = test::camera_at({3e5, 2e6, -1e7}, {0, 1, 0});
+  far.fov_degrees = 1e-4;
+  expect_same_surfaces(tracer, PrimaryCamera(far, kSize), PrimaryCamera(far, kSize));
+  far.projection = Projection::kOrthographic;
+  far.world_from_camera[0] *= 6.0, far.world_from_camera[1] *= 5.0;
+  expect_same_surfaces(tracer, PrimaryCamera(far, kSize), PrimaryCamera(far, kSize));
+  // The host makes the rays of environment cameras.
+  Camera room = test::camera_at({0.1, 3, -12}, {0, 1, 0});
+  room.projection = Projection::kEnvironment;
+  const PrimaryCamera around(room, kSize);
+  EXPECT_EQ(expect_same_surfaces(tracer, around, around).on_gpu, nullptr);
 }
 
 TEST_F(GpuPictureTest, NearestHitsWithFalloff) {
