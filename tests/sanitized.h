@@ -1,12 +1,20 @@
 #pragma once
 
+extern "C" {
+void __asan_init() __attribute__((weak));
+void __tsan_init() __attribute__((weak));
+}
+
 namespace packtrace::test {
 
-/// Whether the tests are built with sanitizers, under which tracing rays and comparing many values take too long.
-#ifdef PACKTRACE_SANITIZED
-inline constexpr bool kSanitized = true;
-#else
-inline constexpr bool kSanitized = false;
-#endif
+/// Whether the program runs with sanitizers, under which tracing rays and comparing many values take too long. Asks the
+/// linker, because objects of tests are the same with and without AddressSanitizer.
+inline bool sanitized() { return __asan_init != nullptr || __tsan_init != nullptr; }
+
+/// Number of rays, repeats and the like for a test: an eighth of `count` with sanitizers.
+template <typename Number>
+Number fewer(Number count) {
+  return sanitized() ? count / 8 : count;
+}
 
 } // namespace packtrace::test

@@ -52,13 +52,15 @@ CommandResult run_program(const std::string& program, const std::vector<std::str
   return result;
 }
 
+std::string packtrace_program() { return PACKTRACE_BINARY; }
+
 CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
                             const std::filesystem::path& folder) {
-  return run_program(PACKTRACE_BINARY, arguments, environment, folder);
+  return run_program(packtrace_program(), arguments, environment, folder);
 }
 
 CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::function<void()>& prepare) {
-  return run_program(PACKTRACE_BINARY, arguments, {}, {}, prepare);
+  return run_program(packtrace_program(), arguments, {}, {}, prepare);
 }
 
 std::string small_scene_text() {

@@ -24,7 +24,9 @@ CommandResult run_program(const std::string& program, const std::vector<std::str
                           const std::vector<std::string>& environment = {}, const std::filesystem::path& folder = {},
                           const std::function<void()>& prepare = {});
 
-/// Runs the packtrace program under test with run_program().
+/// Path of the packtrace program under test.
+std::string packtrace_program();
+/// Runs it with run_program().
 CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {},
                             const std::filesystem::path& folder = {});
 /// Same, with prepare() called in the child process first.

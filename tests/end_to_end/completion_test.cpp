@@ -120,7 +120,7 @@ std::string bash_offers(const std::string& words, const std::filesystem::path& f
     COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
     _packtrace
     printf '%s\n' "${COMPREPLY[@]}")";
-  return run_program("bash", {"-c", script, PACKTRACE_BINARY}, {}, folder).out;
+  return run_program("bash", {"-c", script, packtrace_program()}, {}, folder).out;
 }
 
 TEST(Completion, BashOffersVerbsValuesAndFiles) {

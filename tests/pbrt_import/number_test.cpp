@@ -17,7 +17,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint64_t kShare = test::kSanitized ? 50 : 1; // they slow each value down by more than ten times
+const uint64_t kShare = test::sanitized() ? 50 : 1; // they slow each value down by more than ten times
 
 /// Numbers of values in all tests together, without sanitizers.
 constexpr uint64_t kRandomBits = 4'000'000, kDecimals = 4'000'000, kHalfway = 1'200'000, kEdges = 500'000,

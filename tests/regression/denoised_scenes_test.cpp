@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 
 constexpr ImageSize kSize{96, 54};
 constexpr uint32_t kTruthSpp = 128; ///< of moving views, whose errors are large
-constexpr uint32_t kStillTruthSpp = kSanitized ? 64 : 1024;
+const uint32_t kStillTruthSpp = sanitized() ? 64 : 1024;
 constexpr double kNotWorse = 0.98; ///< share of the reference's PSNR that is as good
 constexpr double kStep = 0.5;      ///< degrees per frame of orbits
 
@@ -41,7 +41,7 @@ protected:
   void SetUp() override {
     const char* const shared = std::getenv("PACKTRACE_SCENES");
     if (GetParam().shared && shared == nullptr) GTEST_SKIP() << "PACKTRACE_SCENES is not set";
-    if (kSanitized && std::string(GetParam().name) != "room/room.pbrt") GTEST_SKIP() << "the room is enough";
+    if (sanitized() && std::string(GetParam().name) != "room/room.pbrt") GTEST_SKIP() << "the room is enough";
     const fs::path file =
         (GetParam().shared ? fs::path(shared) : fs::path(PACKTRACE_SOURCE_DIR) / "assets") / GetParam().name;
     if (GetParam().shared && !fs::exists(file)) GTEST_SKIP() << file << " is not there";
@@ -105,7 +105,7 @@ TEST_P(DenoisedScenes, StillViewsConvergeBetterThanTheMeanOfTheirSamples) {
     EXPECT_GT(denoised.psnr, raw.psnr) << f;
     EXPECT_GT(denoised.ssim, raw.ssim) << f;
     EXPECT_GE(denoised.psnr, kNotWorse * rivals.psnr) << f;
-    if (kSanitized || f != 64) continue;
+    if (sanitized() || f != 64) continue;
     EXPECT_GE(denoised.psnr, 34.0);
     EXPECT_GE(denoised.ssim, 0.95);
     EXPECT_LE(denoised.flip, 0.05);

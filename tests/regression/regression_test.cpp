@@ -74,7 +74,7 @@ std::vector<std::string> scenes() {
 PictureSettings settings() {
   const json& picture = limits().at("picture");
   PictureSettings result{picture.at("width"), picture.at("height"), picture.at("spp"), picture.at("depth_tolerance")};
-  if (kSanitized) result.spp = 4; // the same code; limits of occlusion are for the full number
+  if (sanitized()) result.spp = 4; // the same code; limits of occlusion are for the full number
   return result;
 }
 
@@ -95,7 +95,7 @@ TEST_P(Regression, SceneKeepsItsLimits) {
   const fs::path file = root() / scene;
   if (!fs::exists(file) && std::string_view(kGroup) == "shared") GTEST_SKIP() << file << " is not there";
   ASSERT_TRUE(fs::exists(file)) << "limits.json has a scene that does not exist";
-  const Metrics metrics = measure_scene(file, settings(), !kSanitized);
+  const Metrics metrics = measure_scene(file, settings(), !sanitized());
   record(scene, metrics);
   ASSERT_TRUE(limits().at(kGroup).contains(scene))
       << "no entry in tests/regression/limits.json; tests/regression/propose_limits.py proposes one";
@@ -103,7 +103,7 @@ TEST_P(Regression, SceneKeepsItsLimits) {
   EXPECT_FALSE(entry.at("why").get<std::string>().empty());
   const json& limit = entry.at("limits");
   for (const auto& [name, value] : metrics) {
-    if (kSanitized && name.find("_ao_") != std::string::npos) continue;
+    if (sanitized() && name.find("_ao_") != std::string::npos) continue;
     ASSERT_TRUE(limit.contains(name)) << "no limit for " << name;
     const double bound = limit.at(name);
     if (name == "triangles" || name == "errors")

@@ -182,7 +182,7 @@ Mesh triangles_around_an_edge() {
 }
 
 /// Triangles of the soup, of which no two merge: errors of its levels take long to measure under sanitizers.
-constexpr uint32_t kSoup = test::kSanitized ? 1500 : 6000;
+const uint32_t kSoup = test::sanitized() ? 1500 : 6000;
 
 } // namespace
 

@@ -19,7 +19,7 @@ using test::closest;
 constexpr size_t kManyRays = 1'000'000, kRaysPerPrecision = 100'000;
 
 /// One ray of so many is traced: they are slow under sanitizers, and builds without them find rare leaks.
-constexpr size_t kRayShare = test::kSanitized ? 10 : 1;
+const size_t kRayShare = test::sanitized() ? 10 : 1;
 
 /// Rays from inside a closed mesh to its vertices, to points on its edges and elsewhere, and along the axes. All must
 /// hit.
@@ -164,7 +164,7 @@ std::vector<Ray> rays_from_sides(const UnitSpace& space, const DAffine& world_fr
 }
 
 TEST(PackedLeaks, NoneFromBesideTheSidesOfACube) {
-  constexpr size_t kRays = 50000 / kRayShare;
+  const size_t kRays = 50000 / kRayShare;
   constexpr int kCells = 8;
   const Mesh mesh = cube(1, kCells);
   for (const bool instanced : {false, true})
