@@ -8,6 +8,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/trace/embree/embree_tracer.h"
 #include "tests/runtime/trace/moved_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -38,8 +39,8 @@ void expect_embree_agrees(const BakedScene& scene, const PackedTracer& tracer, c
                           uint32_t seed) {
   const DeformedSource source(scene, {nullptr, &frame});
   const EmbreeTracer embree(source, {});
-  const std::vector<Ray> rays = random_rays(20000, kNear, tracer.space(), seed);
-  const std::vector<Ray> same = random_rays(20000, kNear, embree.space(), seed);
+  const std::vector<Ray> rays = random_rays(test::fewer(20000u), kNear, tracer.space(), seed);
+  const std::vector<Ray> same = random_rays(test::fewer(20000u), kNear, embree.space(), seed);
   const std::vector<RayHit> hits = closest(tracer, rays), expected = closest(embree, same);
   const std::vector<uint8_t> occluded = any(tracer, rays);
   size_t found = 0, different = 0;
@@ -49,7 +50,7 @@ void expect_embree_agrees(const BakedScene& scene, const PackedTracer& tracer, c
     different += hits[i].valid() != expected[i].valid() ||
                  (hits[i].valid() && std::abs(hits[i].t - expected[i].t) > 1e-4f * expected[i].t + 5e-6f);
   }
-  EXPECT_GT(found, 2000u);
+  EXPECT_GT(found, test::fewer(2000u));
   EXPECT_LE(different, 3u); // rays so close to an edge that rounding decides
 }
 

@@ -9,6 +9,7 @@
 
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -36,12 +37,12 @@ TEST(EmbreeClusterTracer, FindsWhatPackedFindsToTheBit) {
   const BakedScene baked(test::varied_scene());
   for (const PackedIsa isa : test::isas()) {
     const PackedTracer packed(baked.file, baked.source, isa);
-    const std::vector<Ray> rays = random_rays(100000, {{-9, -1, -9}, {9, 6, 9}}, packed.space());
+    const std::vector<Ray> rays = random_rays(test::fewer(100000u), {{-9, -1, -9}, {9, 6, 9}}, packed.space());
     for (const ClusterPrimitives primitives : {ClusterPrimitives::kClusters, ClusterPrimitives::kLeafNodes}) {
       const EmbreeClusterTracer clusters(baked.file, baked.source, isa, primitives);
       ASSERT_EQ(clusters.isa(), packed.isa());
       for (const uint32_t ray_class : {kCameraRays, kOcclusionRays})
-        EXPECT_GT(same_hits(clusters, packed, rays, ray_class), 15000u);
+        EXPECT_GT(same_hits(clusters, packed, rays, ray_class), test::fewer(15000u));
     }
   }
 }
@@ -82,7 +83,7 @@ TEST(EmbreeClusterTracer, ResolvesAsPackedDoes) {
 TEST(EmbreeClusterTracer, FindsTheSameOnAllThreads) {
   const BakedScene baked(test::varied_scene());
   const EmbreeClusterTracer tracer(baked.file, baked.source);
-  const std::vector<Ray> rays = random_rays(50000, {{-9, -1, -9}, {9, 6, 9}}, tracer.space(), 6);
+  const std::vector<Ray> rays = random_rays(test::fewer(40000u), {{-9, -1, -9}, {9, 6, 9}}, tracer.space(), 6);
   const std::vector<RayHit> expected = closest(tracer, rays);
   std::vector<RayHit> hits(rays.size());
   tbb::parallel_for(size_t{0}, rays.size() / 100, [&](size_t i) {

@@ -8,6 +8,7 @@
 #include "runtime/trace/embree/embree_tracer.h"
 #include "runtime/trace/source/lod_source.h"
 #include "tests/runtime/trace/moving_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -86,7 +87,7 @@ void expect_moves_like_new(const SceneSource& source, const Movers& movers, cons
   const std::unique_ptr<RayTracer> tracer = make(source);
   std::vector<Affine> now = transforms_of(source);
   RandomMotion motion(7);
-  const std::vector<Ray> rays = random_rays(6000, {{-9, -1, -9}, {9, 7, 9}}, tracer->space());
+  const std::vector<Ray> rays = random_rays(test::fewer(6000u), {{-9, -1, -9}, {9, 7, 9}}, tracer->space());
   for (uint32_t frame = 0; frame < 6; ++frame) {
     std::vector<uint32_t> instances;
     std::vector<Affine> places;
@@ -176,7 +177,7 @@ TEST(MovingInstances, OfLevelsOfDetailArePlacedAsInANewTracer) {
 }
 
 TEST(MovingInstances, GiveTheSameTreeForAnyNumberOfThreads) {
-  const BakedScene baked(room_of(3000));
+  const BakedScene baked(room_of(test::fewer(3000u)));
   const Movers movers = movers_from(kStill, baked.source, kRoom);
   std::vector<std::vector<RayHit>> results;
   for (const size_t threads : {size_t{1}, size_t{2}, size_t{5}}) {

@@ -9,6 +9,7 @@
 #include "runtime/trace/embree/embree_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -56,10 +57,10 @@ TEST(PackedTracer, FindsWhatEmbreeFinds) {
   const PackedTracer packed(baked.file, baked.source);
   ASSERT_EQ(embree.space().scale(), packed.space().scale());
   const Bounds near{{-9, -1, -9}, {9, 6, 9}};
-  const std::vector<Ray> rays = random_rays(200000, near, packed.space());
+  const std::vector<Ray> rays = random_rays(test::fewer(200000u), near, packed.space());
   for (const uint32_t ray_class : {kCameraRays, kOcclusionRays}) {
     const Difference d = difference(packed, embree, rays, ray_class);
-    EXPECT_GT(d.hits, 30000u);
+    EXPECT_GT(d.hits, test::fewer(30000u));
     EXPECT_LE(d.yes_no, 4u); // Float matrices displace Embree's instances; one lies 3000 units away.
     EXPECT_LE(d.distance, 4u);
     EXPECT_LT(d.worst, 1e-3);
