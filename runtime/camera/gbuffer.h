@@ -43,7 +43,7 @@ struct GBuffer {
   std::vector<float> previous_z;
   /// World-space length of a pixel at view z 1 (PrimaryCamera::pixel_spread()); 0 if unknown.
   float pixel_spread = 0.0f;
-  std::shared_ptr<gpu::DeviceView> on_gpu; ///< the hits that a GPU found; null with other tracers
+  std::shared_ptr<gpu::DeviceView> on_gpu; ///< memory for a GPU's hits, kept from frame to frame; else null
 
   void resize(ImageSize new_size) {
     size = new_size;

@@ -32,6 +32,11 @@ struct RayBatch {
   SurfaceAttributes attributes[kBatch];
 };
 
+/// @param spread PrimaryCamera::pixel_spread()
+float pixel_width(Projection projection, float spread, float view_z) {
+  return projection == Projection::kOrthographic ? spread : spread * view_z;
+}
+
 class PrimaryTracer {
 public:
   PrimaryTracer(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
@@ -210,7 +215,8 @@ private:
     out_.position[pixel] = Vec3(c.position.at(i));
     out_.geometric_normal[pixel] = Vec3(facing);
     out_.normal[pixel] = shading_normal(attributes, *hit.placement, facing);
-    const float width = pixel_width(now_, view_z) * textures_.width_px * static_cast<float>(space_.scale());
+    const float width = pixel_width(now_.projection(), out_.pixel_spread, view_z) * textures_.width_px *
+                        static_cast<float>(space_.scale());
     out_.albedo[pixel] = surface_albedo(source_, textures_.pyramids, hit, attributes.material, Vec2(c.u[i], c.v[i]),
                                         {batch.rays[i].direction, Vec3(facing), width});
     out_.instance[pixel] = hit.placement->instance;
@@ -259,8 +265,7 @@ bool approach_scene(CameraRay& ray) {
 }
 
 float pixel_width(const PrimaryCamera& camera, float view_z) {
-  const auto spread = static_cast<float>(camera.pixel_spread());
-  return camera.projection() == Projection::kOrthographic ? spread : spread * view_z;
+  return pixel_width(camera.projection(), static_cast<float>(camera.pixel_spread()), view_z);
 }
 
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,

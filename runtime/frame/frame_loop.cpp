@@ -12,6 +12,7 @@
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/frame/pixel_sums.h"
 #include "runtime/frame/shaded_filter.h"
 #include "runtime/frame/surface_layers.h"
 #include "runtime/stopwatch.h"
@@ -24,11 +25,6 @@ namespace {
 /// Frames of a still view that share an offset of the camera rays. With 32 frames, 2 give as good images as 1 and half
 /// as many camera rays; 4 lose 0.5 to 1 dB (docs/denoiser.md).
 constexpr uint32_t kFramesPerOffset = 2;
-
-uint64_t count_hits(const GBuffer& g) {
-  return static_cast<uint64_t>(
-      std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
-}
 
 /// Marks that nothing has moved since the G-buffer was traced.
 void forget_motion(GBuffer& gbuffer) {
@@ -356,11 +352,7 @@ std::span<const float> FrameLoop::accumulated_ao(std::vector<float>& raw_mean, P
   const DenoisedAo& denoised = denoiser_.denoise(config_.view_layers);
   denoised_ = &denoised;
   report.times.denoise_s += denoising.seconds();
-  double sum = 0.0;
-  uint64_t count = 0;
-  for (size_t i = 0; i < denoised.ao.size(); ++i)
-    if (denoised.ao[i] >= 0.0f) sum += static_cast<double>(denoised.tspp[i]), ++count;
-  report.mean_history = count > 0 ? sum / static_cast<double>(count) : 0.0;
+  report.mean_history = mean_history(denoised);
   return denoised.ao;
 }
 

@@ -29,7 +29,7 @@ void clear_plain_layers(uint32_t layers, RenderedImage& image) {
     else
       layer = {};
   };
-  image.ao.assign(n, kInvalidAo), image.coverage.assign(n, 0.0f);
+  image.ao.resize(n), image.coverage.resize(n); // each pixel is written
   clear(image.ao_raw, kAoRawLayer, kInvalidAo);
   clear(image.depth, kDepthLayer, 0.0f);
   clear(image.normal, kNormalLayer, Vec3(0));
@@ -157,10 +157,10 @@ void MeanLayers::resolve(const FrameConfig& config, const GBuffer& last, std::sp
       const float light = std::max(ao[in], 0.0f);
       shaded += emitters_exist_ ? Vec3(s.emitters) + (s.albedo - s.emitter_albedo) * light : s.albedo * light;
     }
+    image.coverage[out] = hits > 0.0f ? hits / rays : 0.0f;
+    image.ao[out] = ao_hits > 0.0f ? ao_sum * (1.0f / ao_hits) : kInvalidAo;
     if (hits == 0.0f) return;
     const float scale = 1.0f / hits;
-    image.coverage[out] = hits / rays;
-    if (ao_hits > 0.0f) image.ao[out] = ao_sum * (1.0f / ao_hits);
     if (raw_hits > 0.0f && (layers & kAoRawLayer)) image.ao_raw[out] = raw_sum * (1.0f / raw_hits);
     if (layers & kDepthLayer) image.depth[out] = depth * scale;
     const float length = glm::length(normal);
