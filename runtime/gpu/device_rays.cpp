@@ -86,6 +86,18 @@ private:
   uint64_t most_;
 };
 
+/// Allocates an eighth more than is needed now, because the number of points changes from frame to frame; exactly as
+/// much if there is no room for more.
+template <typename Allocate>
+void with_slack(uint64_t bytes, const Allocate& allocate) {
+  try {
+    allocate(bytes + bytes / 8);
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
+    allocate(bytes);
+  }
+}
+
 template <typename Record>
 std::span<const std::byte> push_bytes(const Record& record) {
   return std::as_bytes(std::span(&record, 1));
@@ -111,13 +123,13 @@ struct DeviceRays::State {
   void make_room(Buffer& buffer, uint64_t bytes, const char* what) {
     if (buffer.bytes() >= bytes) return;
     buffer = Buffer();
-    buffer = Buffer(device, bytes, BufferPlace::kDevice, what);
+    with_slack(bytes, [&](uint64_t all) { buffer = Buffer(device, all, BufferPlace::kDevice, what); });
   }
   void make_room_for_points() {
     const uint64_t bytes = uint64_t{point_count} * sizeof(PointRecord);
     if (points.bytes() >= bytes && points.bytes() > 0) return;
     points = StagedBuffer();
-    points = StagedBuffer(device, bytes, "points");
+    with_slack(bytes, [&](uint64_t all) { points = StagedBuffer(device, all, "points"); });
   }
   uint64_t most_threads() const { return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * kThreads; }
   void make_queue_kernel();

@@ -91,8 +91,8 @@ std::shared_ptr<gpu::DeviceView> GpuTracer::trace_camera(const PrimaryCamera& ca
   try {
     return device_rays_->trace_view(view_record(camera, space()), film, ray_class, std::move(reused),
                                     [&](double) { progress.check_cancelled(); });
-  } catch (const Error& error) { // spans of rays need less memory
-    if (error.kind() != ErrorKind::kLimitExceeded) throw;
+  } catch (const Error& error) { // spans of rays need less memory, and smaller buffers
+    if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
     return nullptr;
   }
 }
