@@ -13,9 +13,12 @@ using WorldFace = std::array<std::array<float, 3>, 3>;
 
 /// Faces of all instances in world space, each beginning with its smallest corner.
 /// @param mirroring only of instances that mirror, or do not
-inline std::multiset<WorldFace> world_faces(const BakedFile& file, std::optional<bool> mirroring = std::nullopt) {
+/// @param not_instanced only of geometries in world space
+inline std::multiset<WorldFace> world_faces(const BakedFile& file, std::optional<bool> mirroring = std::nullopt,
+                                            bool not_instanced = false) {
   std::multiset<WorldFace> faces;
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
+    if (not_instanced && (file.geometries()[file.instances()[i].geometry].flags & baked::kWorldSpace) == 0) continue;
     const Decoded decoded = decode(file, file.instances()[i].geometry);
     const DAffine map(file.world_from_object(i));
     if (mirroring && swaps_handedness(map) != *mirroring) continue;

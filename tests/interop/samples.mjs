@@ -3,7 +3,7 @@ import fs from "node:fs";
 import path from "node:path";
 import { PNG } from "pngjs";
 import { validate } from "./validate.mjs";
-import { check, json } from "./process.mjs";
+import { check, json, run } from "./process.mjs";
 
 const kCorners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 const kTriangles = [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 3, 6, 2, 3, 7, 6, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5];
@@ -70,12 +70,20 @@ function floats(sample, values, type, more = {}) {
   return sample.accessor({ bufferView: view, componentType: 5126, type, count: values.flat().length / sizes[type], ...more });
 }
 
-/** Adds an animation of one channel of node 0 with the keys 0 and 2 s. */
+/** Adds an animation of one channel of node 0 with the keys 0 and 2 s. At 1 s it must give what the rest state does not. */
 function animate(sample, path, type, values, interpolation) {
   const input = floats(sample, [0, 2], "SCALAR", { min: [0], max: [2] });
   const output = floats(sample, values, type);
   sample.json.animations = [{ samplers: [{ input, output, interpolation }], channels: [{ sampler: 0, target: { node: 0, path } }] }];
 }
+
+/** Values of a translation's keys that give 0 at 1 s, and elsewhere with another interpolation. */
+const kTranslations = {
+  LINEAR: [[-1, 0, 0], [1, 0, 0]],
+  STEP: [[0, 0, 0], [1, 0, 0]],
+  // In-tangent, value and out-tangent of each key; the first and the last tangent have no effect.
+  CUBICSPLINE: [[9, 9, 9], [-2, 0, 0], [2, 0, 0], [-2, 0, 0], [0, 0, 0], [9, 9, 9]],
+};
 
 /** The box of the vertices times 1/2, so that something has to double them. */
 const halved = kCorners.map((c) => c.map((v) => v / 2));
@@ -84,7 +92,11 @@ function half(sample) {
   return sample.accessor({ bufferView: view, componentType: 5126, type: "VEC3", count: 8, min: [0, 0, 0], max: [0.5, 0.5, 0.5] });
 }
 
-/** By name: a function that fills a sample, the number of triangles, and options of packtrace. The box is [0, 1]^3. */
+/**
+ * By name: a function that fills a sample, the number of triangles, options of packtrace, and what becomes of it: a
+ * function of the report of `info` and of the texts of the OBJ and MTL files that `export` writes of the baked sample.
+ * The box is [0, 1]^3.
+ */
 const kSamples = {
   bytes: [(s) => s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(kTriangles, Uint8Array, 5121) }), 12],
   shorts: [(s) => s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() }), 12],
@@ -94,7 +106,7 @@ const kSamples = {
     const view = s.view(new Float32Array(corners.flat()), { target: 34962 });
     s.primitive({ attributes: { POSITION: s.accessor({ bufferView: view, componentType: 5126, type: "VEC3", count: 36, min: [0, 0, 0], max: [1, 1, 1] }) } });
   }, 12],
-  strip: [(s) => s.primitive({ mode: 5, attributes: { POSITION: s.positions() }, indices: s.indices([3, 2, 7, 6, 5, 2, 1, 3, 0, 7, 4, 5, 0, 1]) }), 12],
+  strip: [(s) => s.primitive({ mode: 5, attributes: { POSITION: s.positions() }, indices: s.indices([2, 3, 6, 7, 4, 3, 0, 2, 1, 6, 5, 4, 1, 0]) }), 12],
   fan: [(s) => s.primitive({ mode: 6, attributes: { POSITION: s.positions() }, indices: s.indices([0, 1, 2, 6, 7, 4, 5]) }), 5],
   interleaved: [(s) => {
     const values = new Float32Array(kCorners.flatMap((c) => [...c, ...c.map((v) => (v - 0.5) * 2 / Math.sqrt(3))]));
@@ -157,6 +169,7 @@ const kSamples = {
   }, 12],
   morph_animated: [(s) => {
     kSamples.morph[0](s);
+    s.json.meshes[0].weights = [0];
     animate(s, "weights", "SCALAR", [0, 2], "LINEAR");
   }, 12, ["--time", "1"]],
   skin: [(s) => {
@@ -168,25 +181,44 @@ const kSamples = {
     s.primitive({ attributes: { POSITION: half(s), JOINTS_0: s.accessor({ bufferView: joints, componentType: 5121, type: "VEC4", count: 8 }),
       WEIGHTS_0: s.accessor({ bufferView: weights, componentType: 5126, type: "VEC4", count: 8 }) }, indices: s.indices() });
   }, 12],
-  ...Object.fromEntries(["LINEAR", "STEP", "CUBICSPLINE"].map((interpolation) => [`animation_${interpolation.toLowerCase()}`, [(s) => {
+  ...Object.fromEntries(Object.entries(kTranslations).map(([interpolation, values]) => [`animation_${interpolation.toLowerCase()}`, [(s) => {
+    s.json.nodes[0].translation = [5, 0, 0];
     s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
-    const zero = [0, 0, 0], from = interpolation === "STEP" ? zero : [-1, 0, 0], to = [1, 0, 0];
-    animate(s, "translation", "VEC3", interpolation === "CUBICSPLINE" ? [zero, from, zero, zero, to, zero] : [from, to], interpolation);
+    animate(s, "translation", "VEC3", values, interpolation);
   }, 12, ["--time", "1"]]])),
-  textured: [(s) => texture(s), 12],
+  animation_rotation: [(s) => { // from a turn by -90 degrees to one by 90 degrees around x: both pass 0 on the sphere
+    const h = Math.SQRT1_2;
+    s.json.nodes[0].rotation = [0, 1, 0, 0];
+    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
+    animate(s, "rotation", "VEC4", [[-h, 0, 0, h], [h, 0, 0, h]], "LINEAR");
+  }, 12, ["--time", "1"]],
+  animation_scale: [(s) => {
+    s.json.nodes[0].scale = [7, 7, 7];
+    s.primitive({ attributes: { POSITION: half(s) }, indices: s.indices() });
+    animate(s, "scale", "VEC3", [[1, 3, 2], [3, 1, 2]], "LINEAR");
+  }, 12, ["--time", "1"]],
+  textured: [(s) => texture(s), 12, [], (info, obj, mtl) => info.textures_found === 1 && /^map_Kd -clamp on .*png$/m.test(mtl)],
   texture_transform: [(s) => {
     s.json.extensionsUsed = ["KHR_texture_transform"];
     texture(s, { extensions: { KHR_texture_transform: { offset: [0.25, 0], scale: [2, 2], rotation: 0.5 } } });
-  }, 12],
-  textured_mask: [(s) => texture(s, {}, { alphaMode: "MASK", alphaCutoff: 0.25, doubleSided: true }), 12],
+  }, 12, [], (info, obj) => { // of the corner (1, 1); v points upwards there
+    const c = Math.cos(0.5), sine = Math.sin(0.5), wanted = [2 * c + 2 * sine + 0.25, 1 - (2 * c - 2 * sine)];
+    const step = 1 / 32; // of coordinates of an image of 2 x 2 pixels
+    return rows(obj, "vt").some((uv) => uv.every((value, k) => Math.abs(value - wanted[k]) < step));
+  }],
+  textured_mask: [(s) => texture(s, {}, { alphaMode: "MASK", alphaCutoff: 0.25, doubleSided: true }), 12, [],
+    (info, obj, mtl) => info.masks === 1 && /^map_d /m.test(mtl) && /^map_Kd /m.test(mtl)],
   ...Object.fromEntries(Object.entries({
-    KHR_materials_unlit: {}, KHR_materials_emissive_strength: { emissiveStrength: 3 }, KHR_materials_transmission: { transmissionFactor: 1 },
-    KHR_materials_specular: { specularFactor: 0.5 }, KHR_materials_ior: { ior: 1.3 },
-  }).map(([extension, values]) => [extension.replace("KHR_materials_", ""), [(s) => {
+    KHR_materials_unlit: [{}, (info) => info.materials_by_kind.matte === 1],
+    KHR_materials_emissive_strength: [{ emissiveStrength: 3 }, (info, obj, mtl) => info.area_lights > 0 && /^Ke /m.test(mtl)],
+    KHR_materials_transmission: [{ transmissionFactor: 1 }, (info, obj, mtl) => info.materials_by_kind.glass === 1 && /^d /m.test(mtl)],
+    KHR_materials_specular: [{ specularFactor: 0.5 }, (info, obj, mtl) => info.materials_by_kind.disney === 1 && !/^(Ke|d) /m.test(mtl)],
+    KHR_materials_ior: [{ ior: 1.3 }, (info, obj, mtl) => info.materials_by_kind.disney === 1 && !/^(Ke|d) /m.test(mtl)],
+  }).map(([extension, [values, expected]]) => [extension.replace("KHR_materials_", ""), [(s) => {
     s.json.extensionsUsed = [extension];
     s.json.materials = [{ emissiveFactor: extension.endsWith("strength") ? [1, 1, 1] : [0, 0, 0], extensions: { [extension]: values } }];
     s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 0 });
-  }, 12]])),
+  }, 12, [], expected]])),
   camera_and_lights: [(s) => {
     s.json.extensionsUsed = ["KHR_lights_punctual"];
     s.json.extensions = { KHR_lights_punctual: { lights: ["point", "directional", "spot"].map((type) => ({ type, ...(type === "spot" ? { spot: {} } : {}) })) } };
@@ -195,7 +227,7 @@ const kSamples = {
     s.json.nodes.push({ camera: 0, translation: [0, 0, 5] }, { camera: 1, translation: [0, 0, 5] });
     s.json.scenes[0].nodes = s.json.nodes.map((_, i) => i);
     s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices() });
-  }, 12],
+  }, 12, [], (info) => info.light_sources === 3 && info.camera_list.map((c) => c.projection).join() === "perspective,orthographic"],
   colours_and_tangents: [(s) => {
     const colours = s.view(new Uint8Array(32).fill(200), { target: 34962, byteStride: 4 });
     const normals = s.view(new Float32Array(kCorners.flatMap(() => [0, 0, 1])), { target: 34962 });
@@ -213,20 +245,39 @@ const kSamples = {
   ...Object.fromEntries(["OPAQUE", "MASK", "BLEND"].map((alphaMode) => [`alpha_${alphaMode.toLowerCase()}`, [(s) => {
     s.json.materials = [{ alphaMode, ...(alphaMode === "MASK" ? { alphaCutoff: 0.25 } : {}), pbrMetallicRoughness: { baseColorFactor: [1, 0.5, 0, 0.75] } }];
     s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 0 });
-  }, 12]])),
+  }, 12, [], (info, obj, mtl) => /^Kd 1 0\.5 0$/m.test(mtl)]])),
 };
 
+/** The numbers of the lines of an OBJ file with a keyword. */
+const rows = (text, keyword) => [...text.matchAll(new RegExp(`^${keyword} (.*)$`, "gm"))].map((line) => line[1].split(" ").map(Number));
+
+/** Volume that the faces of an OBJ file enclose; negative if they face inwards. */
+function volume(obj) {
+  const positions = rows(obj, "v");
+  let sixfold = 0;
+  for (const [, corners] of obj.matchAll(/^f (.*)$/gm)) {
+    const [a, b, c] = corners.split(" ").map((corner) => positions[parseInt(corner) - 1]);
+    sixfold += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+  }
+  return sixfold / 6;
+}
+
 export async function readSamples(packtrace, work) {
-  for (const [name, [fill, triangles, options = []]] of Object.entries(kSamples)) {
-    const sample = new Sample(), file = path.join(work, `box_${name}.gltf`);
+  for (const [name, [fill, triangles, options = [], expected]] of Object.entries(kSamples)) {
+    const sample = new Sample(), at = (ending) => path.join(work, `box_${name}.${ending}`), file = at("gltf");
     fill(sample);
     sample.write(file);
     await validate(file, `box ${name}`);
     const info = json(packtrace, "info", file, ...options);
     check(info.triangles === triangles, `box ${name} has its triangles`, `${info.triangles} instead of ${triangles}`);
     check(info.problems.errors + info.problems.warnings === 0, `box ${name} is read without problems`);
-    const bounds = JSON.stringify(info.bounds), expected = JSON.stringify({ hi: [0, 1, 1], lo: [-1, 0, 0] });
-    check(info.bounds.hi.every((v, i) => Math.abs(v - [0, 1, 1][i]) < 1e-5) && info.bounds.lo.every((v, i) => Math.abs(v - [-1, 0, 0][i]) < 1e-5),
-          `box ${name} is where it should be`, `${bounds} instead of ${expected}`);
+    const bounds = JSON.stringify(info.bounds), lo = [-1, 0, 0], hi = [0, 1, 1]; // x is mirrored
+    check(info.bounds.hi.every((v, i) => Math.abs(v - hi[i]) < 1e-5) && info.bounds.lo.every((v, i) => Math.abs(v - lo[i]) < 1e-5),
+          `box ${name} is where it should be`, `${bounds} instead of ${JSON.stringify({ hi, lo })}`);
+    run(packtrace, "bake", file, "-o", at("ptk"), "--for", "shading", "--lod", "off", "--force", "-q", ...options);
+    run(packtrace, "export", at("ptk"), "-o", at("obj"), "--force", "-q");
+    const obj = fs.readFileSync(at("obj"), "utf8"), enclosed = volume(obj);
+    if (triangles === 12) check(Math.abs(enclosed - 1) < 1e-3, `the faces of box ${name} look outwards`, `they enclose ${enclosed}`);
+    if (expected) check(expected(info, obj, fs.readFileSync(at("mtl"), "utf8")), `box ${name} keeps its materials, lights and cameras`);
   }
 }

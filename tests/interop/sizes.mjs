@@ -1,14 +1,15 @@
 // Sizes and measured errors of glTF files that packtrace, gltfpack and glTF-Transform make of a scene.
 // Usage: node sizes.mjs PACKTRACE WORK SCENE.pbrt [BITS]
 //   BITS  of positions over the whole scene: gltfpack's -vp (default 16); packtrace bakes with the largest step that has its position error
-// All begin with one portable file of a fine lattice, and errors are those against it.
+// All begin with one portable file of a fine lattice, and errors are those against it. The exit code is 1 if a file lacks
+// more than 0.1 % of its vertices, since its errors are then not those of the whole.
 import fs from "node:fs";
 import path from "node:path";
 import { NodeIO } from "@gltf-transform/core";
 import { ALL_EXTENSIONS } from "@gltf-transform/extensions";
 import { MeshoptDecoder } from "meshoptimizer";
 import draco3d from "draco3dgltf";
-import { bytesOf, json, run, tool } from "./process.mjs";
+import { bytesOf, check, json, run, summary, tool } from "./process.mjs";
 
 const multiply = (a, b) => {
   const out = new Array(16).fill(0);
@@ -137,9 +138,10 @@ run(tool("gltfpack"), "-i", at("portable.glb"), "-o", at("gltfpack.glb"), "-cc",
 for (const codec of ["meshopt", "draco"])
   run(tool("gltf-transform"), "optimize", at("portable.glb"), at(`transform_${codec}.glb`), "--compress", codec, "--texture-compress", "webp", "--simplify", "false");
 const reference = await vertices(at("portable.glb")), reach = 4 * step;
+const kMaxLost = 0.001;
 const measure = async (ending) => {
   const test = await vertices(at(ending)), near = errors(reference, test, reach);
-  return near.lost < 0.001 ? near : errors(reference, test, 16 * reach, 2000); // instances may be further away
+  return near.lost < kMaxLost ? near : errors(reference, test, 16 * reach, 2000); // instances may be further away
 };
 const measured = { gltfpack: await measure("gltfpack.glb") };
 let own = step; // the largest step with gltfpack's position error
@@ -155,9 +157,11 @@ run(packtrace, "export", at("ptk"), "-o", at("exchange.glb"), "--instancing", "-
 console.log(`${name}: steps of ${step.toPrecision(3)}, packtrace ${own.toPrecision(3)}; errors in gltfpack's steps and degrees: rms, largest`);
 for (const ending of ["gltfpack", "transform_meshopt", "transform_draco", "web", "exchange"]) {
   const file = at(`${ending}.glb`), e = measured[ending] ?? (await measure(`${ending}.glb`));
+  check(e.lost <= kMaxLost, `${name}.${ending} has its vertices`, `${(100 * e.lost).toFixed(2)} % are not within ${(16 * reach).toPrecision(3)}`);
   const parts = Object.entries(streams(file)).map(([use, bytes]) => `${use} ${(bytes / 1000).toFixed(0)}`);
   console.log(`${ending}: ${(bytesOf(file) / 1000).toFixed(0)} kB (${parts.join(", ")}); position ${(e.position_rms / step).toFixed(2)}, ` +
     `${(e.position_max / step).toFixed(2)}; normal ${e.normal_rms.toFixed(2)}, ${e.normal_max.toFixed(2)}${e.turned > 0 ? `; ${(100 * e.turned).toFixed(3)} % of normals off by more than 3 degrees` : ""}${e.lost > 0 ? `; ${(100 * e.lost).toFixed(2)} % of vertices not found` : ""}`);
 }
 const best = Math.min(...["gltfpack", "transform_meshopt"].map((ending) => bytesOf(at(`${ending}.glb`))));
 console.log(`web takes ${(bytesOf(at("web.glb")) / best).toFixed(2)} of the smallest meshopt file`);
+process.exitCode = summary();

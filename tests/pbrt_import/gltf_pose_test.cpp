@@ -100,6 +100,51 @@ TEST(GltfSkins, SetsOfJointsAreLimited) {
   EXPECT_TRUE(import_at(folder, gltf).reported("has more than 16 sets of joints"));
 }
 
+/// Every path and interpolation gives what the node's rest state and other interpolations do not.
+TEST(GltfNodes, EveryKindOfAnimationIsEvaluated) {
+  struct Case {
+    const char *path, *interpolation;
+    std::vector<float> values; ///< of the keys 1 s and 3 s
+    std::vector<DVec3> corners;
+  };
+  constexpr float kHalf = 0.70710678f;
+  const std::vector<Case> cases = {
+      {"translation", "LINEAR", {0, 0, 0, 0, 4, 0}, {{0, 1, 0}, {-1, 1, 0}, {0, 2, 0}}},
+      {"translation", "STEP", {0, 8, 0, 0, 4, 0}, {{0, 8, 0}, {-1, 8, 0}, {0, 9, 0}}},
+      // in-tangent, value, out-tangent; at 1/4 of 2 s: 9/64 * 2 s * 16 + 5/32 * 4 + 3/64 * 2 s * 8
+      {"translation",
+       "CUBICSPLINE",
+       {9, 9, 9, 0, 0, 0, 0, 16, 0, 0, -8, 0, 0, 4, 0, 9, 9, 9},
+       {{0, 5.875, 0}, {-1, 5.875, 0}, {0, 6.875, 0}}},
+      // a quarter of the way from no turn to one by 120 degrees around z
+      {"rotation",
+       "LINEAR",
+       {0, 0, 0, 1, 0, 0, 0.8660254f, 0.5f},
+       {{0, 0, 0}, {-0.8660254, 0.5, 0}, {0.5, 0.8660254, 0}}},
+      {"rotation", "STEP", {0, 0, kHalf, kHalf, 0, 0, 0, 1}, {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}}},
+      {"scale", "LINEAR", {2, 1, 1, 6, 5, 1}, {{0, 0, 0}, {-3, 0, 0}, {0, 2, 0}}}};
+  const SceneFolder folder;
+  for (const Case& c : cases) {
+    GltfBuilder gltf;
+    const size_t positions = gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0});
+    gltf.mesh({{"attributes", {{"POSITION", positions}}}});
+    gltf.node({{"mesh", 0}, {c.path, c.path == std::string("rotation") ? Json{1, 0, 0, 0} : Json{7, 7, 7}}});
+    const size_t times = gltf.accessor<float>("SCALAR", 5126, {1, 3});
+    const size_t values = gltf.accessor<float>(c.path == std::string("rotation") ? "VEC4" : "VEC3", 5126, c.values);
+    gltf.json["animations"] = {
+        {{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", c.path}}}}}},
+         {"samplers", {{{"input", times}, {"output", values}, {"interpolation", c.interpolation}}}}}};
+    const Imported imported = import_at(folder, gltf, 1.5);
+    EXPECT_EQ(imported.text(), "");
+    ASSERT_EQ(imported.scene.shapes.size(), 1u);
+    for (size_t i = 0; i < 3; ++i) {
+      const DVec3 p = placed(imported.scene.shapes[0], imported.scene, i);
+      EXPECT_LT(glm::distance(p, c.corners[i]), 1e-6)
+          << c.path << " " << c.interpolation << ": " << p.x << " " << p.y << " " << p.z;
+    }
+  }
+}
+
 TEST(GltfMorphs, WeightsMustMatchTheTargets) {
   const SceneFolder folder;
   for (const size_t count : {1, 2, 3}) {
