@@ -33,6 +33,7 @@ public:
     materials_.add_all(uvs_.map());
     GltfMeshes meshes(file_, config_, materials_, uvs_, model_, result_.report);
     std::vector<bool> merged = merge_world(meshes);
+    if (config_.codec == GltfCodec::kMeshopt) code_integers();
     for (uint32_t g = 0; g < encoded_.size(); ++g) {
       if (config_.codec == GltfCodec::kDraco)
         for (const GltfPrimitive& primitive : encoded_[g].primitives)
@@ -83,7 +84,7 @@ private:
       progress_.check_cancelled();
       for (PlainPrimitive& plain : plain_primitives(file_, static_cast<uint32_t>(g))) {
         for (const LatticePoint& p : plain.lattice) encoded_[g].box.extend(p);
-        encoded_[g].primitives.push_back({std::move(plain), std::nullopt});
+        encoded_[g].primitives.push_back({std::move(plain), std::nullopt, std::nullopt});
       }
       progress_.advance();
     });
@@ -175,8 +176,27 @@ private:
       merged[i] = true;
       placed.push_back({g, instance.first_slot, &encoded_[g]});
     }
-    meshes.add_world(std::move(placed));
+    meshes.add_world(std::move(placed), progress_);
     return merged;
+  }
+
+  /// Codes the primitives of geometries that are not merged, where their positions are stored as integers.
+  void code_integers() {
+    progress_.begin("compressing", encoded_.size());
+    tbb::parallel_for(size_t{0}, encoded_.size(), [&](size_t g) {
+      const GltfLatticeBox& box = encoded_[g].box;
+      const std::optional<PositionFrame> frame = box.empty ? std::nullopt : position_frame(box.lo, box.hi);
+      for (GltfPrimitive& primitive : encoded_[g].primitives) {
+        progress_.check_cancelled();
+        if (!frame) continue;
+        PlainPrimitive& plain = primitive.plain;
+        primitive.meshopt = meshopt_primitive(plain, *frame, config_.meshopt_normal_bits, uvs_, encoded_[g].with_uvs);
+        PlainPrimitive rest;
+        rest.material_slot = plain.material_slot;
+        plain = std::move(rest);
+      }
+      progress_.advance();
+    });
   }
 
   void report() {

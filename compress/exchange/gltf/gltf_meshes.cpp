@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <limits>
+
+#include <tbb/parallel_for.h>
 
 #include "pbrt_import/base/printable.h"
 
@@ -126,17 +127,15 @@ GltfMeshes::Template GltfMeshes::add_draco(const GltfPrimitive& from) {
   return made;
 }
 
-GltfJson GltfMeshes::add_coded(const PlainPrimitive& plain, const PositionFrame& frame, bool with_uvs) {
-  const int normal_bits = config_.meshopt_normal_bits;
-  const MeshoptPrimitive merged = meshopt_primitive(plain, normal_bits, uvs_, with_uvs);
-  report_.collapsed_triangles += merged.collapsed_triangles;
-  report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, merged.max_normal_error_degrees);
-  if (merged.triangles == 0) return nullptr;
-  const MeshoptPrimitive coded = ordered_for_codec(merged, frame, normal_bits, uvs_);
+/// Adds a primitive; returns null if no triangle is left of it.
+GltfJson GltfMeshes::add_coded(const MeshoptPrimitive& coded, const PositionFrame& frame) {
+  report_.collapsed_triangles += coded.collapsed_triangles;
+  report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, coded.max_normal_error_degrees);
+  if (coded.triangles == 0) return nullptr;
   ++report_.primitives;
   report_.vertices += coded.lattice.size(), report_.triangles += coded.triangles;
   model_.use_extension("KHR_mesh_quantization", true);
-  return add_meshopt_primitive(coded, frame, normal_bits, uvs_, streams_);
+  return add_meshopt_primitive(coded, frame, config_.meshopt_normal_bits, uvs_, streams_);
 }
 
 /// Adds a geometry whose positions are integers; those whose lattice is too fine stay floats.
@@ -152,7 +151,7 @@ void GltfMeshes::add_meshopt(uint32_t geometry, GltfGeometry&& from) {
       templates_[geometry].push_back(add_plain(std::move(primitive.plain)));
       continue;
     }
-    GltfJson coded = add_coded(primitive.plain, *frame, from.with_uvs);
+    GltfJson coded = add_coded(*primitive.meshopt, *frame);
     if (!coded.is_null()) templates_[geometry].push_back({primitive.plain.material_slot, std::move(coded), {}, false});
     primitive = {};
   }
@@ -176,7 +175,7 @@ int GltfMeshes::add_floats(std::span<const float> values, const char* type) {
 
 int GltfMeshes::add_indices(const std::vector<Triangle>& triangles, size_t vertices) {
   GltfJson accessor{{"count", 3 * triangles.size()}, {"type", "SCALAR"}};
-  const bool small = vertices <= std::numeric_limits<uint16_t>::max(); // 65535 restarts strips in some viewers
+  const bool small = fits_short_indices(vertices);
   accessor["componentType"] = small ? kGltfUnsignedShort : kGltfUnsignedInt;
   if (small) {
     std::vector<uint16_t> shorts;
@@ -224,7 +223,7 @@ std::optional<int> GltfMeshes::mesh_of(uint32_t geometry, uint32_t first_slot) {
   return place->second;
 }
 
-void GltfMeshes::add_world(std::vector<Placed>&& geometries) {
+void GltfMeshes::add_world(std::vector<Placed>&& geometries, Progress& progress) {
   // Batches of one step, material and set of attributes. The extent of a batch stays within 16 bits where its
   // geometries do.
   struct Key {
@@ -257,19 +256,31 @@ void GltfMeshes::add_world(std::vector<Placed>&& geometries) {
     }
     *placed.encoded = {};
   }
+  std::vector<Batch*> all;
+  for (auto& [key, list] : batches)
+    for (Batch& batch : list) all.push_back(&batch);
+  progress.begin("compressing", all.size());
+  tbb::parallel_for(size_t{0}, all.size(), [&](size_t i) {
+    progress.check_cancelled();
+    Batch& batch = *all[i];
+    batch.coded = meshopt_primitive(batch.plain, *position_frame(batch.box.lo, batch.box.hi),
+                                    config_.meshopt_normal_bits, uvs_, true);
+    batch.plain = {};
+    progress.advance();
+  });
   for (const auto& [key, list] : batches)
-    for (const Batch& batch : list) add_batch(batch, key.step, key.material);
+    for (const Batch& batch : list)
+      add_batch(batch, *position_frame(batch.box.lo, batch.box.hi), key.step, key.material);
 }
 
-void GltfMeshes::add_batch(const Batch& batch, double step, int material) {
-  const std::optional<PositionFrame> frame = position_frame(batch.box.lo, batch.box.hi);
-  GltfJson primitive = add_coded(batch.plain, *frame, true);
+void GltfMeshes::add_batch(const Batch& batch, const PositionFrame& frame, double step, int material) {
+  GltfJson primitive = add_coded(batch.coded, frame);
   if (primitive.is_null()) return;
   primitive["material"] = material;
   GltfJson node{{"mesh", model_.add("meshes", {{"primitives", GltfJson::array({std::move(primitive)})}})},
                 {"scale", {step, step, step}}};
-  if (frame->origin != LatticePoint{})
-    for (const int64_t q : frame->origin) node["translation"].push_back(static_cast<double>(q) * step);
+  if (frame.origin != LatticePoint{})
+    for (const int64_t q : frame.origin) node["translation"].push_back(static_cast<double>(q) * step);
   world_nodes_.push_back(model_.add("nodes", std::move(node)));
 }
 

@@ -34,6 +34,7 @@ struct GltfLatticeBox {
 struct GltfPrimitive {
   PlainPrimitive plain;
   std::optional<DracoPrimitive> draco;
+  std::optional<MeshoptPrimitive> meshopt; ///< without the values of `plain`
 };
 
 /// The primitives of a geometry, and what they need to be stored.
@@ -77,7 +78,7 @@ public:
     uint32_t geometry, first_slot;
     GltfGeometry* encoded;
   };
-  void add_world(std::vector<Placed>&& geometries);
+  void add_world(std::vector<Placed>&& geometries, Progress& progress);
 
   /// Nodes that add_world() made, without a parent.
   const std::vector<int>& world_nodes() const { return world_nodes_; }
@@ -95,13 +96,14 @@ private:
   struct Batch {
     PlainPrimitive plain;
     GltfLatticeBox box;
+    MeshoptPrimitive coded;
   };
 
   Template add_plain(PlainPrimitive&& plain);
   Template add_draco(const GltfPrimitive& from);
   void add_meshopt(uint32_t geometry, GltfGeometry&& from);
-  void add_batch(const Batch& batch, double step, int material);
-  GltfJson add_coded(const PlainPrimitive& plain, const PositionFrame& frame, bool with_uvs);
+  void add_batch(const Batch& batch, const PositionFrame& frame, double step, int material);
+  GltfJson add_coded(const MeshoptPrimitive& coded, const PositionFrame& frame);
   int add_floats(std::span<const float> values, const char* type);
   int add_indices(const std::vector<Triangle>& triangles, size_t vertices);
   int mapped_uvs(uint32_t geometry, size_t part, const UvMap& map);

@@ -16,6 +16,10 @@ using GltfJson = nlohmann::json;
 inline constexpr int kGltfByte = 5120, kGltfShort = 5122, kGltfUnsignedShort = 5123, kGltfUnsignedInt = 5125,
                      kGltfFloat = 5126;
 inline constexpr int kGltfVertices = 34962, kGltfIndices = 34963;
+inline constexpr int kGltfTriangleStrip = 5; ///< mode of a primitive
+
+/// Whether 16-bit indices suffice. 65535 restarts strips in some viewers.
+constexpr bool fits_short_indices(size_t vertices) { return vertices <= 65535; }
 
 /// The number with the fewest digits that reads as the same float.
 double shortest(float value);

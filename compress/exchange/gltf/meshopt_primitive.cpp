@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include <meshoptimizer.h>
+#include <tbb/parallel_invoke.h>
 
 #include "compress/exchange/gltf/rail_strip.h"
 
@@ -104,9 +105,86 @@ std::span<const std::byte> bytes_of_vector(const std::vector<T>& values) {
   return std::as_bytes(std::span(values));
 }
 
-} // namespace
+/// Adds accessors of the stored values; return their numbers.
+int add_positions(const std::vector<LatticePoint>& points, const PositionFrame& frame, MeshoptStreams& streams) {
+  using Form = PositionFrame::Form;
+  LatticePoint lo = points.front(), hi = lo;
+  std::vector<int64_t> mantissas;
+  std::vector<std::array<uint16_t, 4>> shorts;
+  for (const LatticePoint& p : points) {
+    std::array<uint16_t, 4> element{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      lo[axis] = std::min(lo[axis], p[axis]), hi[axis] = std::max(hi[axis], p[axis]);
+      const int64_t stored = p[axis] - frame.origin[axis];
+      if (frame.form == Form::kFloat)
+        mantissas.push_back(stored);
+      else
+        element[axis] = static_cast<uint16_t>(stored);
+    }
+    if (frame.form != Form::kFloat) shorts.push_back(element);
+  }
+  GltfJson accessor{{"type", "VEC3"}};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    accessor["min"].push_back(lo[axis] - frame.origin[axis]);
+    accessor["max"].push_back(hi[axis] - frame.origin[axis]);
+  }
+  accessor["componentType"] = frame.form == Form::kFloat   ? kGltfFloat
+                              : frame.form == Form::kShort ? kGltfShort
+                                                           : kGltfUnsignedShort;
+  if (frame.form == Form::kFloat)
+    return streams.add({12, kGltfVertices, "EXPONENTIAL"}, exponential(mantissas, 0), std::move(accessor));
+  return streams.add({8, kGltfVertices, {}}, bytes_of_vector(shorts), std::move(accessor));
+}
 
-MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits, const UvGrid& uvs, bool keep_uvs) {
+int add_normals(const std::vector<std::array<int16_t, 4>>& codes, int bits, MeshoptStreams& streams) {
+  const bool small = bits <= kByteBits;
+  GltfJson accessor{{"type", "VEC3"}, {"componentType", small ? kGltfByte : kGltfShort}, {"normalized", true}};
+  if (!small) return streams.add({8, kGltfVertices, "OCTAHEDRAL"}, bytes_of_vector(codes), std::move(accessor));
+  std::vector<std::array<int8_t, 4>> bytes;
+  bytes.reserve(codes.size());
+  for (const auto& n : codes)
+    bytes.push_back({static_cast<int8_t>(n[0]), static_cast<int8_t>(n[1]), static_cast<int8_t>(n[2]), 0});
+  return streams.add({4, kGltfVertices, "OCTAHEDRAL"}, bytes_of_vector(bytes), std::move(accessor));
+}
+
+int add_uvs(const std::vector<std::array<float, 2>>& uvs, const UvGrid& grid, MeshoptStreams& streams) {
+  const bool coded = grid.step > 0.0;
+  GltfJson accessor{{"type", "VEC2"}, {"componentType", coded ? kGltfUnsignedShort : kGltfFloat}};
+  if (!coded) return streams.add({8, kGltfVertices, {}}, bytes_of_vector(uvs), std::move(accessor));
+  std::vector<std::array<uint16_t, 2>> codes;
+  codes.reserve(uvs.size());
+  for (const auto& uv : uvs) codes.push_back({static_cast<uint16_t>(uv[0]), static_cast<uint16_t>(uv[1])});
+  return streams.add({4, kGltfVertices, {}}, bytes_of_vector(codes), std::move(accessor));
+}
+
+/// The primitive, with triangles and vertices ordered for the codec: as a list or as a strip, whichever is smaller.
+MeshoptPrimitive ordered_for_codec(const MeshoptPrimitive& list, const PositionFrame& frame, int normal_bits,
+                                   const UvGrid& uvs) {
+  std::vector<uint32_t> indices(list.indices.size());
+  meshopt_optimizeVertexCacheStrip(indices.data(), list.indices.data(), indices.size(), list.lattice.size());
+  MeshoptPrimitive strip, ordered;
+  uint64_t strip_bytes = 0, ordered_bytes = 0;
+  const auto coded_bytes = [&](const MeshoptPrimitive& primitive) {
+    GltfModel alone;
+    MeshoptStreams streams(alone);
+    add_meshopt_primitive(primitive, frame, normal_bits, uvs, streams);
+    return streams.finish();
+  };
+  tbb::parallel_invoke(
+      [&] {
+        strip = as_strip(list, indices);
+        strip_bytes = coded_bytes(strip);
+      },
+      [&] {
+        ordered = as_list(list, indices);
+        ordered_bytes = coded_bytes(ordered);
+      });
+  constexpr uint64_t kModeBytes = 9; // of "mode" in the document
+  return strip_bytes + kModeBytes < ordered_bytes ? std::move(strip) : std::move(ordered);
+}
+
+/// Rounds the values of a primitive and merges equal vertices; triangles are a list in their order.
+MeshoptPrimitive merged_primitive(const PlainPrimitive& plain, int normal_bits, const UvGrid& uvs, bool keep_uvs) {
   MeshoptPrimitive result;
   std::vector<StoredVertex> vertices =
       stored_vertices(plain, normal_bits, uvs, keep_uvs, result.max_normal_error_degrees);
@@ -134,6 +212,8 @@ MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits,
   return result;
 }
 
+} // namespace
+
 std::optional<PositionFrame> position_frame(const LatticePoint& lo, const LatticePoint& hi) {
   using Form = PositionFrame::Form;
   const auto fits = [&](int64_t least, int64_t most) {
@@ -150,81 +230,24 @@ std::optional<PositionFrame> position_frame(const LatticePoint& lo, const Lattic
   return PositionFrame{Form::kFloat, lo};
 }
 
-MeshoptPrimitive ordered_for_codec(const MeshoptPrimitive& list, const PositionFrame& frame, int normal_bits,
-                                   const UvGrid& uvs) {
-  std::vector<uint32_t> indices(list.indices.size());
-  meshopt_optimizeVertexCacheStrip(indices.data(), list.indices.data(), indices.size(), list.lattice.size());
-  MeshoptPrimitive strip = as_strip(list, indices);
-  MeshoptPrimitive ordered = as_list(list, std::move(indices));
-  const auto coded_bytes = [&](const MeshoptPrimitive& primitive) {
-    GltfModel alone;
-    MeshoptStreams streams(alone);
-    add_meshopt_primitive(primitive, frame, normal_bits, uvs, streams);
-    return streams.finish();
-  };
-  constexpr uint64_t kModeBytes = 9; // of "mode" in the document
-  return coded_bytes(strip) + kModeBytes < coded_bytes(ordered) ? strip : ordered;
+MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, const PositionFrame& frame, int normal_bits,
+                                   const UvGrid& uvs, bool keep_uvs) {
+  MeshoptPrimitive merged = merged_primitive(plain, normal_bits, uvs, keep_uvs);
+  return merged.triangles == 0 ? merged : ordered_for_codec(merged, frame, normal_bits, uvs);
 }
 
 GltfJson add_meshopt_primitive(const MeshoptPrimitive& primitive, const PositionFrame& frame, int normal_bits,
                                const UvGrid& uvs, MeshoptStreams& streams) {
-  using Form = PositionFrame::Form;
-  GltfJson attributes;
-  LatticePoint lo = primitive.lattice.front(), hi = lo;
-  std::vector<int64_t> mantissas;
-  std::vector<std::array<uint16_t, 4>> shorts;
-  for (const LatticePoint& p : primitive.lattice) {
-    std::array<uint16_t, 4> element{};
-    for (size_t axis = 0; axis < 3; ++axis) {
-      lo[axis] = std::min(lo[axis], p[axis]), hi[axis] = std::max(hi[axis], p[axis]);
-      const int64_t stored = p[axis] - frame.origin[axis];
-      if (frame.form == Form::kFloat)
-        mantissas.push_back(stored);
-      else
-        element[axis] = static_cast<uint16_t>(stored);
-    }
-    if (frame.form != Form::kFloat) shorts.push_back(element);
-  }
-  GltfJson accessor{{"type", "VEC3"}};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    accessor["min"].push_back(lo[axis] - frame.origin[axis]);
-    accessor["max"].push_back(hi[axis] - frame.origin[axis]);
-  }
-  accessor["componentType"] = frame.form == Form::kFloat   ? kGltfFloat
-                              : frame.form == Form::kShort ? kGltfShort
-                                                           : kGltfUnsignedShort;
-  attributes["POSITION"] =
-      frame.form == Form::kFloat
-          ? streams.add({12, kGltfVertices, "EXPONENTIAL"}, exponential(mantissas, 0), std::move(accessor))
-          : streams.add({8, kGltfVertices, {}}, bytes_of_vector(shorts), std::move(accessor));
-  if (!primitive.normals.empty()) {
-    GltfJson normals{
-        {"type", "VEC3"}, {"componentType", normal_bits <= kByteBits ? kGltfByte : kGltfShort}, {"normalized", true}};
-    std::vector<std::array<int8_t, 4>> bytes;
-    if (normal_bits <= kByteBits)
-      for (const auto& n : primitive.normals)
-        bytes.push_back({static_cast<int8_t>(n[0]), static_cast<int8_t>(n[1]), static_cast<int8_t>(n[2]), 0});
-    attributes["NORMAL"] =
-        normal_bits <= kByteBits
-            ? streams.add({4, kGltfVertices, "OCTAHEDRAL"}, bytes_of_vector(bytes), std::move(normals))
-            : streams.add({8, kGltfVertices, "OCTAHEDRAL"}, bytes_of_vector(primitive.normals), std::move(normals));
-  }
-  if (!primitive.uvs.empty()) {
-    GltfJson coordinates{{"type", "VEC2"}, {"componentType", uvs.step > 0.0 ? kGltfUnsignedShort : kGltfFloat}};
-    std::vector<std::array<uint16_t, 2>> codes;
-    if (uvs.step > 0.0)
-      for (const auto& uv : primitive.uvs)
-        codes.push_back({static_cast<uint16_t>(uv[0]), static_cast<uint16_t>(uv[1])});
-    attributes["TEXCOORD_0"] =
-        uvs.step > 0.0 ? streams.add({4, kGltfVertices, {}}, bytes_of_vector(codes), std::move(coordinates))
-                       : streams.add({8, kGltfVertices, {}}, bytes_of_vector(primitive.uvs), std::move(coordinates));
-  }
-  constexpr int kTriangleStrip = 5;
+  GltfJson attributes{{"POSITION", add_positions(primitive.lattice, frame, streams)}};
+  if (!primitive.normals.empty()) attributes["NORMAL"] = add_normals(primitive.normals, normal_bits, streams);
+  if (!primitive.uvs.empty()) attributes["TEXCOORD_0"] = add_uvs(primitive.uvs, uvs, streams);
   GltfJson result{{"attributes", std::move(attributes)}};
-  if (primitive.strip.empty())
+  if (primitive.strip.empty()) {
     result["indices"] = streams.add_indices(primitive.indices, primitive.lattice.size());
-  else
-    result["indices"] = streams.add_strip(primitive.strip, primitive.lattice.size()), result["mode"] = kTriangleStrip;
+  } else {
+    result["indices"] = streams.add_strip(primitive.strip, primitive.lattice.size());
+    result["mode"] = kGltfTriangleStrip;
+  }
   return result;
 }
 

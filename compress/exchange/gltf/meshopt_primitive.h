@@ -30,10 +30,6 @@ struct MeshoptPrimitive {
   double max_normal_error_degrees = 0.0;
 };
 
-/// Rounds the values of a primitive and merges equal vertices; triangles are a list in their order.
-/// @param normal_bits 4..16
-MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, int normal_bits, const UvGrid& uvs, bool keep_uvs);
-
 /// How the integers of positions are stored, so that the object-space position is step * (stored + origin).
 struct PositionFrame {
   enum class Form : uint8_t { kShort, kUnsignedShort, kFloat } form = Form::kShort;
@@ -43,9 +39,11 @@ struct PositionFrame {
 /// The smallest form that holds all points from lo to hi; none if their extent exceeds 24 bits.
 std::optional<PositionFrame> position_frame(const LatticePoint& lo, const LatticePoint& hi);
 
-/// The primitive, with triangles and vertices ordered for the codec: as a list or as a strip, whichever is smaller.
-MeshoptPrimitive ordered_for_codec(const MeshoptPrimitive& list, const PositionFrame& frame, int normal_bits,
-                                   const UvGrid& uvs);
+/// Rounds the values of a primitive, merges equal vertices, and orders triangles and vertices for the codec: as a list
+/// or as a strip, whichever is smaller. Both are encoded, at once if threads are free.
+/// @param normal_bits 4..16
+MeshoptPrimitive meshopt_primitive(const PlainPrimitive& plain, const PositionFrame& frame, int normal_bits,
+                                   const UvGrid& uvs, bool keep_uvs);
 
 /// Adds accessors for the primitive; returns the glTF primitive without a material.
 GltfJson add_meshopt_primitive(const MeshoptPrimitive& primitive, const PositionFrame& frame, int normal_bits,

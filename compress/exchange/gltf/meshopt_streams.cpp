@@ -10,8 +10,15 @@ namespace packtrace {
 
 namespace {
 
-/// Whether 16-bit indices suffice. 65535 restarts strips in some viewers.
-bool fits_shorts(size_t vertices) { return vertices <= std::numeric_limits<uint16_t>::max(); }
+/// Sets the codec's versions, which are global. Streams of several threads are encoded at once.
+void choose_versions() {
+  static const bool chosen = [] {
+    meshopt_encodeIndexVersion(1); // the only version of the extension
+    meshopt_encodeVertexVersion(0);
+    return true;
+  }();
+  static_cast<void>(chosen);
+}
 
 } // namespace
 
@@ -31,7 +38,7 @@ int MeshoptStreams::add(const Format& format, std::span<const std::byte> bytes, 
 }
 
 int MeshoptStreams::add_indices(const std::vector<uint32_t>& indices, size_t vertices) {
-  const bool small = fits_shorts(vertices);
+  const bool small = fits_short_indices(vertices);
   const uint32_t stride = small ? 2 : 4;
   Stream& to = stream({stride, kGltfIndices, {}, true});
   GltfJson accessor{{"bufferView", to.view},
@@ -44,7 +51,7 @@ int MeshoptStreams::add_indices(const std::vector<uint32_t>& indices, size_t ver
 }
 
 int MeshoptStreams::add_strip(std::span<const std::array<uint32_t, 2>> strip, size_t vertices) {
-  const bool small = fits_shorts(vertices);
+  const bool small = fits_short_indices(vertices);
   GltfJson accessor{{"componentType", small ? kGltfUnsignedShort : kGltfUnsignedInt}, {"type", "SCALAR"}};
   std::vector<std::array<uint16_t, 2>> shorts;
   if (small)
@@ -58,8 +65,7 @@ int MeshoptStreams::add_strip(std::span<const std::array<uint32_t, 2>> strip, si
 
 uint64_t MeshoptStreams::finish() {
   uint64_t total = 0;
-  meshopt_encodeIndexVersion(1); // the only version of the extension
-  meshopt_encodeVertexVersion(0);
+  choose_versions();
   for (auto& [format, stream] : streams_) {
     const bool is_indices = format.list;
     const size_t count = is_indices ? stream.indices.size() : stream.bytes.size() / format.stride;

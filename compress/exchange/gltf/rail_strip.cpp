@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <tuple>
 
 namespace packtrace {
 namespace {
@@ -106,10 +107,9 @@ private:
       return n;
     };
     const int64_t left = take(corners_[h]), right = take(corners_[next(h)]), x = take(corners_[previous(h)]);
-    int price = std::numeric_limits<int>::max() / 2;
     const bool goes_left = is_open(twin_[next(h)]), goes_right = is_open(twin_[previous(h)]);
     constexpr int kEnds = 4;
-    price = std::min(cost(x - left) + (goes_left ? 0 : kEnds), cost(x - right) + (goes_right ? 0 : kEnds));
+    const int price = std::min(cost(x - left) + (goes_left ? 0 : kEnds), cost(x - right) + (goes_right ? 0 : kEnds));
     if (result_.elements.empty()) return price;
     const auto [l, r] = result_.elements.back();
     if (left != r) return price + cost(int64_t{r} - l) + 2 * cost(left - int64_t{r}) + cost(right - left);
