@@ -1,14 +1,8 @@
 #include "pbrt_import/gltf/gltf_compression.h"
 
 #include <limits>
-#include <memory>
-#include <new>
+#include <string>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wconversion"
-#pragma GCC diagnostic ignored "-Wshadow"
-#include <draco/compression/decode.h>
-#pragma GCC diagnostic pop
 #include <meshoptimizer.h>
 
 namespace packtrace::gltf {
@@ -80,50 +74,6 @@ std::vector<std::byte> decode_meshopt(const MeshoptView& view, std::span<const s
     break;
   }
   return bytes;
-}
-
-DracoPrimitive decode_draco(std::span<const std::byte> compressed, const DracoWants& wants, const Value& extension) {
-  draco::DecoderBuffer buffer;
-  buffer.Init(reinterpret_cast<const char*>(compressed.data()), compressed.size());
-  draco::Decoder decoder;
-  std::unique_ptr<draco::Mesh> mesh;
-  try {
-    auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-    if (!decoded.ok()) extension.fail(std::string("has damaged Draco data: ") + decoded.status().error_msg());
-    mesh = std::move(decoded).value();
-  } catch (const std::bad_alloc&) {
-    extension.fail("has damaged Draco data: they claim more than the memory holds");
-  } catch (const std::length_error&) {
-    extension.fail("has damaged Draco data: they claim more than the memory holds");
-  }
-  DracoPrimitive primitive;
-  primitive.vertices = mesh->num_points();
-  primitive.indices.reserve(size_t{mesh->num_faces()} * 3);
-  for (draco::FaceIndex face(0); face < mesh->num_faces(); ++face)
-    for (const draco::PointIndex& point : mesh->face(face)) {
-      if (point.value() >= primitive.vertices) extension.fail("has damaged Draco data: an index is out of range");
-      primitive.indices.push_back(point.value());
-    }
-  const Value numbers = extension.at("attributes");
-  for (const auto& [name, components] : wants) {
-    const std::optional<uint64_t> number = numbers.find_integer(name.c_str());
-    if (!number) continue;
-    const draco::PointAttribute* const attribute = *number <= std::numeric_limits<uint32_t>::max()
-                                                       ? mesh->GetAttributeByUniqueId(static_cast<uint32_t>(*number))
-                                                       : nullptr;
-    if (!attribute) extension.fail("names the attribute " + name + ", which the Draco data lack");
-    if (attribute->num_components() < static_cast<int>(components)) extension.fail("has too few components of " + name);
-    std::vector<float> values(size_t{primitive.vertices} * components);
-    for (draco::PointIndex point(0); point < primitive.vertices; ++point) {
-      const draco::AttributeValueIndex value = attribute->mapped_index(point);
-      if (value.value() >= attribute->size() ||
-          !attribute->ConvertValue<float>(value, static_cast<int8_t>(components),
-                                          &values[size_t{point.value()} * components]))
-        extension.fail("has damaged Draco data of " + name);
-    }
-    primitive.attributes[name] = std::move(values);
-  }
-  return primitive;
 }
 
 } // namespace packtrace::gltf

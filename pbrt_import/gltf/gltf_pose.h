@@ -16,8 +16,8 @@ using JointMaps = std::shared_ptr<const std::vector<DAffine>>;
 
 /// What deforms a mesh at the scene's time.
 struct Pose {
-  std::vector<double> weights; ///< of morph targets; empty: the mesh's own
-  JointMaps joints;            ///< of the skin; null: no skin
+  std::span<const double> weights; ///< of morph targets, of the placed node; empty: the mesh's own
+  JointMaps joints;                ///< of the skin; null: no skin
   bool skinned() const { return joints && !joints->empty(); }
   bool empty() const { return weights.empty() && !skinned(); }
 };

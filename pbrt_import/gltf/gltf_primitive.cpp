@@ -5,9 +5,10 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <span>
 
 #include "pbrt_import/gltf/gltf_accessors.h"
-#include "pbrt_import/gltf/gltf_compression.h"
+#include "pbrt_import/gltf/gltf_draco.h"
 
 namespace packtrace::gltf {
 namespace {
@@ -61,7 +62,9 @@ PrimitiveMesh read_draco(Document& document, const Value& primitive, const Value
   const std::span<const std::byte> bytes = document.view_bytes(extension.at("bufferView").integer());
   DracoWants wants{{"POSITION", 3}, {"NORMAL", 3}, {uv_name, 2}};
   if (skinned) wants["JOINTS_0"] = wants["WEIGHTS_0"] = 4;
-  DracoPrimitive decoded = decode_draco(bytes, wants, extension);
+  MemoryReservation memory(document.context().options.memory);
+  DracoPrimitive decoded = decode_draco(bytes, wants, extension, memory);
+  document.values_memory().merge(std::move(memory));
   PrimitiveMesh mesh;
   mesh.vertices = decoded.vertices;
   mesh.indices = std::move(decoded.indices);
@@ -76,11 +79,12 @@ PrimitiveMesh read_draco(Document& document, const Value& primitive, const Value
 }
 
 /// Adds the morph targets of a primitive.
-/// @param weights empty: those of its mesh
-void morph(Document& document, const Value& mesh_value, const Value& primitive, std::vector<double> weights,
+/// @param pose_weights empty: those of its mesh
+void morph(Document& document, const Value& mesh_value, const Value& primitive, std::span<const double> pose_weights,
            PrimitiveMesh& mesh) {
   const std::optional<Value> targets = primitive.find("targets"), own = mesh_value.find("weights");
   if (!targets) return;
+  std::vector<double> weights(pose_weights.begin(), pose_weights.end());
   if (weights.empty() && own) weights = own->numbers(own->size());
   if (!weights.empty() && weights.size() != targets->size())
     primitive.fail("has " + std::to_string(targets->size()) + " morph targets, but " + std::to_string(weights.size()) +

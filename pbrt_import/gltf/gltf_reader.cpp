@@ -35,8 +35,10 @@ void Reader::collect_meshes() {
                uses_.push_back({*mesh, DAffine(1.0), std::move(pose)}); // the node's own map does not matter
                return;
              }
-             for (const DAffine& map : instances_of(*document_, node))
-               uses_.push_back({*mesh, compose(placed.world_from_node, map), pose});
+             const std::vector<DAffine> maps = instances_of(*document_, node);
+             document_->memory().resize(document_->memory().bytes() + maps.size() * sizeof(MeshUse),
+                                        "instances of the glTF document");
+             for (const DAffine& map : maps) uses_.push_back({*mesh, compose(placed.world_from_node, map), pose});
            }),
            "the node is left out");
   }
