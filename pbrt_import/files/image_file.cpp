@@ -118,6 +118,14 @@ std::vector<uint32_t> alpha_bits(const uint8_t* rgba, size_t width, size_t heigh
   return bits;
 }
 
+/// Pixels whose alpha is below 1.
+/// @param rgba 4 bytes per pixel
+uint64_t transparent_pixels(const uint8_t* rgba, size_t width, size_t height) {
+  uint64_t count = 0;
+  for (size_t i = 0; i < width * height; ++i) count += rgba[4 * i + 3] < 255;
+  return count;
+}
+
 ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader& header, bool decode_srgb,
                               ImageWants wants) {
   const PngPalette palette = png_palette(bytes, kDamaged);
@@ -163,9 +171,12 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
     summary = grey ? summarize_bytes<1>(pixels.get(), header.width, header.height, wants, linear)
                    : summarize_bytes<3>(pixels.get(), header.width, header.height, wants, linear);
   }
-  if (wants.mask && wants.alpha_cutoff)
-    summary.nonzero =
-        alpha_bits(decode_png(bytes, 4, stbi_load_from_memory).get(), header.width, header.height, *wants.alpha_cutoff);
+  if (wants.alpha || (wants.mask && wants.alpha_cutoff)) {
+    const auto rgba = decode_png(bytes, 4, stbi_load_from_memory);
+    if (wants.alpha) summary.transparent = transparent_pixels(rgba.get(), header.width, header.height);
+    if (wants.mask && wants.alpha_cutoff)
+      summary.nonzero = alpha_bits(rgba.get(), header.width, header.height, *wants.alpha_cutoff);
+  }
   if (header.wrong_checksums > 0)
     summary.problems.push_back(header.wrong_checksums == 1
                                    ? std::string("a chunk has a wrong checksum; the image may be damaged")
@@ -184,6 +195,7 @@ ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageW
   const TgaPixels pixels = decode_tga(bytes, *header);
   ImageSummary summary =
       summarize_bytes<3>(pixels.rgb.data(), header->width, header->height, wants, linear_of_bytes(decode_srgb));
+  if (wants.alpha) summary.transparent = pixels.transparent_pixels;
   add_problem(summary, pixels.pixels_out_of_range, kNotInPalette, kNotInPaletteMany);
   add_problem(summary, pixels.surplus_pixels, "of the last run lies beyond the image's end; it is ignored",
               "of the last run lie beyond the image's end; they are ignored");
@@ -233,6 +245,7 @@ ImageSummary read_webp(std::span<const std::byte> bytes, bool decode_srgb, Image
     summarizer.add_row<3>(y, row.data(), linear);
   }
   ImageSummary summary = summarizer.finish();
+  if (wants.alpha) summary.transparent = transparent_pixels(pixels.data(), reader.width(), reader.height());
   if (wants.mask && wants.alpha_cutoff)
     summary.nonzero = alpha_bits(pixels.data(), reader.width(), reader.height(), *wants.alpha_cutoff);
   return summary;
@@ -286,6 +299,7 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, Memory
       fail("the EXR image has none of the channels R, G, B and Y");
     const auto w = static_cast<uint32_t>(width);
     ImageSummarizer summarizer(w, static_cast<uint32_t>(height), wants);
+    uint64_t transparent = 0;
     constexpr int64_t kBlock = 64; // a multiple of the block height of every compression except DWAB (256 rows)
     const auto block = static_cast<int>(std::min(height, kBlock));
     std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * static_cast<size_t>(block));
@@ -299,12 +313,16 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, Memory
       file.readPixels(first, last);
       const Imf::Rgba* pixel = rows.data();
       for (int y = first; y <= last; ++y) {
-        for (uint32_t x = 0; x < w; ++x, ++pixel)
+        for (uint32_t x = 0; x < w; ++x, ++pixel) {
           summarizer.add(x, static_cast<uint32_t>(y - box.min.y), {pixel->r, pixel->g, pixel->b});
+          transparent += static_cast<float>(pixel->a) < 1.0f; // 1 without the channel
+        }
         summarizer.end_row();
       }
     }
-    return summarizer.finish();
+    ImageSummary summary = summarizer.finish();
+    if (wants.alpha) summary.transparent = transparent;
+    return summary;
   } catch (const Error&) {
     throw;
   } catch (const std::exception& error) {

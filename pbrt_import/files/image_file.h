@@ -19,6 +19,7 @@ struct ImageSummary {
   uint32_t height = 0;               ///< pixels
   Vec3 average{0.0f};                ///< linear RGB; negative and non-finite values count as 0
   std::vector<std::string> problems; ///< damage that did not prevent reading
+  uint64_t transparent = 0;          ///< pixels whose alpha is below 1; 0 if not wanted
   std::vector<uint8_t> rgb;          ///< layout of AlbedoTexture, clamped to [0, 1]; empty if not wanted or too large
   std::vector<uint32_t> nonzero;     ///< layout of AlphaMask; a bit is set if any channel is not 0, or see alpha_cutoff
   uint32_t map_width = 0;            ///< of `radiance`: that of the image, at most kMaxMapWidth
@@ -35,14 +36,15 @@ struct ImageWants {
   std::optional<float> alpha_cutoff{};
   /// Set: bits of the mask are set where the largest of the linear channels is at least this.
   std::optional<float> grey_cutoff{};
+  bool alpha = false; ///< fill ImageSummary::transparent
 };
 
 /// Only the average is kept of images with more texels.
 inline constexpr uint64_t kMaxTextureTexels = uint64_t{1} << 26;
 
 /// Reads the formats of pbrt, which are PNG, TGA, OpenEXR and PFM, and also HDR, JPEG and WebP. Alpha channels are
-/// ignored, as in pbrt, unless ImageWants::alpha_cutoff is set, which applies to PNG and WebP. Other formats are
-/// rejected with their name.
+/// ignored, as in pbrt, unless ImageWants::alpha_cutoff is set, which applies to PNG and WebP, or ImageWants::alpha.
+/// Other formats are rejected with their name.
 /// @param bytes the whole file
 /// @param decode_srgb whether values of the integer formats are sRGB-encoded
 /// @param memory grows by the memory that the summary and decoding need, before it is allocated

@@ -13,6 +13,7 @@ struct TgaHeader {
   uint32_t width = 0, height = 0; ///< pixels, at least 1
   uint32_t pixel_bits = 0;        ///< 8, 15, 16, 24 or 32; with a palette, the size of an index: 8 or 16
   bool palette = false, grey = false, run_lengths = false;
+  bool alpha = false; ///< colours have alpha, by their size and the image descriptor
   bool from_the_top = false, from_the_right = false;
   uint32_t palette_first = 0, palette_entries = 0, palette_bits = 0; ///< no palette in the file if 0 entries
   size_t palette_offset = 0;                                         ///< in bytes; the pixels follow the palette
@@ -27,6 +28,7 @@ struct TgaPixels {
   std::vector<uint8_t> rgb;         ///< rows from the top, 3 bytes per pixel
   uint64_t surplus_pixels = 0;      ///< pixels of the last run beyond the end of the image
   uint64_t pixels_out_of_range = 0; ///< pixels with an index that the palette lacks, decoded as black
+  uint64_t transparent_pixels = 0;  ///< pixels whose alpha is below 1
 };
 
 /// Decodes the pixels. The caller checks the image size beforehand. Throws Error(kInput), with a message without file

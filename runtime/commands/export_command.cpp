@@ -51,6 +51,7 @@ struct Exported {
   std::vector<ExportedFile> others; ///< beside the main file
   nlohmann::json json;
   std::string text;
+  std::vector<std::string> warnings{}; ///< about the input
 };
 
 /// Returns the layout from --layout or --streams, or else the one that the output's extension implies. Throws
@@ -98,7 +99,7 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
                      Progress& progress, const ByteSink& main, const CompanionFiles& companions) {
   if (layout == kShader) {
     ShaderExport result = export_shader(options.input, options.output, options.shader, budget, progress);
-    return {std::move(result.bytes), {}, std::move(result.json), std::move(result.text)};
+    return {std::move(result.bytes), {}, std::move(result.json), std::move(result.text), std::move(result.warnings)};
   }
   if (!is_baked_file(options.input))
     throw FileError(ErrorKind::kInput, options.input,
@@ -162,6 +163,8 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   output.write(result.bytes);
   companions.keep();
   display.finish();
+  for (const std::string& warning : result.warnings)
+    if (!globals.quiet) print_printable(fmt::format("{}: warning: {}\n", options.input, warning), stderr);
   if (json.wanted()) json.write(result.json);
   if (json.to_stdout() || globals.quiet) return 0;
   print_printable(result.text, output.text_stream());

@@ -24,6 +24,8 @@ struct SourceImage {
   AlbedoTexture texels;
   std::string texture; ///< name of the texture; empty for an image file
   MemoryReservation memory;
+  std::vector<std::string> warnings;
+  uint64_t transparent = 0; ///< texels whose alpha is below 1
 };
 
 std::string texture_name(const BakedFile& file, uint32_t texture) {
@@ -79,7 +81,7 @@ SourceImage read_image_file(const std::string& input, const MemoryBudget& budget
   with_file(input, [&] {
     const std::vector<std::byte> bytes = read_whole_file(input, ~uint64_t{0}, &content);
     try {
-      summary = read_image(bytes, true, ImageWants{false, true, false}, image.memory);
+      summary = read_image(bytes, true, {.colours = true, .alpha = true}, image.memory);
     } catch (const MemoryError&) {
       throw;
     } catch (const Error& error) {
@@ -92,6 +94,13 @@ SourceImage read_image_file(const std::string& input, const MemoryBudget& budget
         fmt::format("{} x {} texels are more than the limit of {}", summary.width, summary.height, kMaxTextureTexels));
   image.texels.width = summary.width, image.texels.height = summary.height;
   image.texels.rgb = std::move(summary.rgb);
+  image.warnings = std::move(summary.problems);
+  image.transparent = summary.transparent;
+  if (image.transparent > 0)
+    image.warnings.push_back(fmt::format(grouped(),
+                                         "alpha is ignored: {:L} of {:L} texels are not opaque, and the "
+                                         "shader shows their colours as stored",
+                                         image.transparent, uint64_t{summary.width} * summary.height));
   return image;
 }
 
@@ -174,10 +183,12 @@ ShaderExport export_image(const std::string& input, const std::string& output, c
            {"bits", 32 * elements},
            {"psnr_db", difference.psnr_db},
            {"max_error", difference.max_error},
+           {"transparent_texels", source.transparent},
            {"bytes", text.size()},
            {"peak_rss_bytes", peak_rss_bytes()}},
           fmt::format(grouped(), "{}: {} x {} texels in {:L} of {:L} array elements, {:L} bytes of text; {}\n", output,
-                      size[0], size[1], elements, config.max_elements, text.size(), error)};
+                      size[0], size[1], elements, config.max_elements, text.size(), error),
+          std::move(source.warnings)};
 }
 
 } // namespace packtrace

@@ -191,7 +191,8 @@ ShaderExport export_shader(const std::string& input, const std::string& output, 
            {"bytes", text.size()},
            {"peak_rss_bytes", peak_rss_bytes()}},
           fmt::format(grouped(), "{}: {} x {} x {} voxels in {:L} of {:L} array elements, {:L} bytes of text\n", output,
-                      size[0], size[1], size[2], elements, config.max_elements, text.size())};
+                      size[0], size[1], size[2], elements, config.max_elements, text.size()),
+          {}};
 }
 
 } // namespace packtrace

@@ -38,6 +38,7 @@ struct ShaderExport {
   std::vector<std::byte> bytes;
   nlohmann::json json;
   std::string text;
+  std::vector<std::string> warnings; ///< about the input
 };
 
 void add_shader_options(CLI::App& verb, ShaderOptions& options);

@@ -60,6 +60,26 @@ TEST(ShaderExport, WhatDoesNotFitIsRefusedWithTheLargestThatDoes) {
   EXPECT_EQ(bench.export_it({"--image-size", "0"}).exit_code, 2);
 }
 
+/// 2 x 1 texels of 32 bits: opaque red, and blue of half the opacity.
+std::string tga_with_alpha(char alpha_bits) {
+  const std::string header{0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 32, alpha_bits};
+  return header + std::string("\x00\x00\xff\xff\xff\x00\x00\x80", 8);
+}
+
+TEST(ShaderExport, AlphaIsNotLostWithoutAWarning) {
+  const ImageBench bench;
+  EXPECT_EQ(bench.export_it({}).err.find("warning"), std::string::npos);
+  const std::string picture = bench / "alpha.tga";
+  write_text(picture, tga_with_alpha(8));
+  const CommandResult warned = bench.export_it({"--json", "-"}, picture);
+  EXPECT_EQ(warned.exit_code, 0);
+  EXPECT_NE(warned.err.find("alpha.tga: warning: alpha is ignored: 1 of 2 texels are not opaque"), std::string::npos)
+      << warned.err;
+  EXPECT_EQ(nlohmann::json::parse(warned.out).at("transparent_texels"), 1);
+  write_text(picture, tga_with_alpha(0)); // the same bytes without a meaning
+  EXPECT_EQ(bench.export_it({}, picture).err.find("warning"), std::string::npos);
+}
+
 TEST(ShaderExport, DamagedImagesAreRefused) {
   const ImageBench bench;
   const std::string whole = read_text(bench.picture()), cut = bench / "cut.png";

@@ -52,6 +52,17 @@ TEST(TgaImage, PixelsComeInEveryOrderAndDepth) {
                  {0x30 / 255.0f, 0x20 / 255.0f, 0x10 / 255.0f});
 }
 
+TEST(TgaImage, TransparentPixelsAreCountedIfTheDescriptorHasAlpha) {
+  for (std::string file : {tga(2, 2, 1, 32, "\x10\x20\x30\x01\x10\x20\x30\xff"),
+                           tga(10, 200, 1, 32, "\xc7\x10\x20\x30\x01\xff\x10\x20\x30\xff"),
+                           tga(3, 2, 1, 16, "\x40\x07\x40\xff"), tga(2, 2, 1, 16, "\xe0\x7f\xe0\xff")}) {
+    const bool runs = file[2] == 10;
+    EXPECT_EQ(transparent(file), 0u);
+    file[17] = static_cast<char>(file[17] | 8);
+    EXPECT_EQ(transparent(file), runs ? 72u : 1u);
+  }
+}
+
 TEST(TgaImage, WhatDoesNotFitIsReported) {
   EXPECT_EQ(problems(tga(10, 3, 1, 24, "\x82\x10\x20\x30")), Problems{});
   EXPECT_EQ(problems(tga(10, 2, 1, 24, "\x82\x10\x20\x30")),

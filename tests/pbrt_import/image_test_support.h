@@ -52,6 +52,12 @@ inline std::string number(uint32_t value, int bytes, bool big_endian = false) {
   return text;
 }
 
+/// Pixels of a file whose alpha is below 1.
+inline uint64_t transparent(const std::string& file) {
+  MemoryReservation memory{MemoryBudget(kBudget)};
+  return read_image(std::as_bytes(std::span(file)), true, ImageWants{.alpha = true}, memory).transparent;
+}
+
 /// Problems of a file that is read in spite of damage.
 inline std::vector<std::string> problems(const std::string& file) { return read(file, true).problems; }
 using Problems = std::vector<std::string>;

@@ -60,6 +60,16 @@ TEST(PngImage, SixteenBitsKeepTheirPrecision) {
   expect_average(png(1, 1, 16, kRgba, "\0\x12\x34\0\0\xff\xff\0\7"s), {value, 0.0f, 1.0f});
 }
 
+TEST(PngImage, TransparentPixelsAreCounted) {
+  EXPECT_EQ(transparent(png(2, 1, 8, kGreyAlpha, "\0\x40\x07\x40\xff"s)), 1u);
+  EXPECT_EQ(transparent(png(2, 1, 8, kRgba, "\0\xff\x80\0\x07\xff\x80\0\xff"s)), 1u);
+  EXPECT_EQ(transparent(png(1, 1, 16, kRgba, "\0\x12\x34\0\0\xff\xff\0\7"s)), 1u);
+  EXPECT_EQ(transparent(png(1, 1, 8, kRgb, "\0\xff\x80\0"s)), 0u);
+  const std::string entry = chunk("tRNS", "\xff\x20"s), palette = png(3, 1, 8, kPalette, "\0\0\1\1"s);
+  EXPECT_EQ(transparent(palette), 0u);
+  EXPECT_EQ(transparent(std::string(palette).insert(palette.find("IDAT") - 4, entry)), 2u);
+}
+
 TEST(PngImage, InterlacedPassesAreCountedRight) {
   for (uint32_t side = 1; side <= 9; ++side) {
     std::string rows;
