@@ -66,7 +66,8 @@ ProxyConfig make_proxy_config(const ProxyOptions& options) {
   }
   config.use = options.proxy == kFieldName ? ProxyUse::kField : ProxyUse::kVoxels;
   if (config.use == ProxyUse::kField && (options.rule || options.fill || options.dag || options.materials))
-    throw Error(ErrorKind::kUsage, "--proxy-surface, -fill, -dag and -materials require --proxy voxels");
+    throw Error(ErrorKind::kUsage,
+                "--proxy-surface, --proxy-fill, --proxy-dag and --proxy-materials require --proxy voxels");
   if (config.use == ProxyUse::kVoxels && options.field_bits)
     throw Error(ErrorKind::kUsage, "--proxy-bits requires --proxy sdf");
   config.field_bits = options.field_bits.value_or(config.field_bits);

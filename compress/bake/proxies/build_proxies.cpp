@@ -128,8 +128,8 @@ std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& confi
     warn(std::to_string(open) + " of " + std::to_string(proxies.size()) +
          " geometries are not closed; their voxels are not filled");
   if (empty > 0)
-    warn(std::to_string(empty) + (empty == 1 ? " geometry has" : " geometries have") +
-         " nothing that occludes and get no proxy");
+    warn(std::to_string(empty) + (empty == 1 ? " geometry has nothing that occludes and gets no proxy"
+                                             : " geometries have nothing that occludes and get no proxy"));
   return proxies;
 }
 
