@@ -186,13 +186,14 @@ void SceneState::choose_proxies(const PrimaryCamera& view, double pixels, FrameR
   if (scene_.file == nullptr) throw Error(ErrorKind::kUnsupported, "--proxy-beyond requires a .ptk file with proxies");
   if (!pose_.empty() || meshes_ || levels_)
     throw Error(ErrorKind::kUnsupported, "--proxy-beyond does not work with things that move or change by distance");
+  build_level_0(report);
   const Stopwatch building;
   std::vector<uint32_t> proxied = small_instances(*scene_.file, *scene_.source, view, pixels);
   if (proxied != proxied_) {
     proxied_ = std::move(proxied);
     proxy_tracer_.reset(); // frees its memory first
     if (!proxied_.empty())
-      proxy_tracer_ = std::make_unique<ProxyTracer>(*scene_.file, *scene_.source, proxied_, scene_.backend);
+      proxy_tracer_ = std::make_unique<ProxyTracer>(*level_0_, *scene_.file, *scene_.source, proxied_, scene_.backend);
   }
   report.times.build_s += building.seconds();
 }

@@ -34,6 +34,13 @@ std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFil
   return std::make_unique<PackedTracer>(*file, source, chosen_isa(), config.movers);
 }
 
+std::unique_ptr<RayTracer> make_tracer_beside(const RayTracer& whole, const SceneSource& source, const BakedFile* file,
+                                              const TracerConfig& config) {
+  const auto* const packed = dynamic_cast<const PackedTracer*>(&whole);
+  if (config.backend == Backend::kPacked && packed != nullptr) return std::make_unique<PackedTracer>(*packed, source);
+  return make_tracer(source, file, config);
+}
+
 std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config) {
   if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree, config.movers);
   if (config.backend == Backend::kGpu) return make_gpu_tracer(source, file, config);

@@ -31,6 +31,12 @@ struct TracerConfig {
 /// the backend's constructor.
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config);
 
+/// Creates a tracer of other instances of the file that another tracer reads at LOD level 0. Shares that tracer's trees
+/// if the backend is packed. Throws as make_tracer().
+/// @param whole of the same config; needed during this call only
+std::unique_ptr<RayTracer> make_tracer_beside(const RayTracer& whole, const SceneSource& source, const BakedFile* file,
+                                              const TracerConfig& config);
+
 /// Creates a tracer at the detail of a plan. Throws as the backend's constructor.
 std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config);
 

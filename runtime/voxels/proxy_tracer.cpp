@@ -43,13 +43,13 @@ std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& 
   return result;
 }
 
-ProxyTracer::ProxyTracer(const BakedFile& file, const SceneSource& source, std::vector<uint32_t> proxied,
-                         const TracerConfig& config)
+ProxyTracer::ProxyTracer(const RayTracer& whole, const BakedFile& file, const SceneSource& source,
+                         std::vector<uint32_t> proxied, const TracerConfig& config)
     : proxied_(std::move(proxied)),
       voxels_(file, [this](uint32_t i) { return std::ranges::binary_search(proxied_, i); }),
       source_(source, proxied_,
               config.backend == Backend::kEmbree ? OtherInstances::Absent::kNoGeometry : OtherInstances::Absent::kFlat),
-      others_(make_tracer(source_, &file, config)) {}
+      others_(make_tracer_beside(whole, source_, &file, config)) {}
 
 float ProxyTracer::voxel_distance(const Ray& ray) const {
   if (!(ray.tfar > ray.tnear)) return ray.tfar;

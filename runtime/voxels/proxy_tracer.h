@@ -27,11 +27,13 @@ std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& 
 /// that surfaces do not occlude themselves; what is nearer is smaller than the proxy's error.
 class ProxyTracer final : public RayTracer {
 public:
+  /// @param whole tracer of all instances of `source` at LOD level 0, whose trees are shared as make_tracer_beside()
+  /// does; needed during this call only
   /// @param proxied instances, as small_instances() gives them; not empty
   /// @param source must outlive the tracer
-  /// @param config of the tracer of the others, without movers
+  /// @param config of `whole`, without movers
   /// Throws like make_tracer().
-  ProxyTracer(const BakedFile& file, const SceneSource& source, std::vector<uint32_t> proxied,
+  ProxyTracer(const RayTracer& whole, const BakedFile& file, const SceneSource& source, std::vector<uint32_t> proxied,
               const TracerConfig& config);
 
   std::string_view name() const override { return others_->name(); }

@@ -52,7 +52,7 @@ void GpuTables::add_trees() {
 }
 
 void GpuTables::add_clusters() {
-  const std::span<const packed::TraceCluster> all = tracer_.traced_trees().clusters;
+  const std::span<const packed::TraceCluster> all = tracer_.traced_trees().clusters();
   const std::span<const uint8_t> payload = file_.sections().payload;
   for (uint32_t i = 0; i < all.size(); ++i) {
     if (all[i].bits != nullptr && (all[i].bits < payload.data() || all[i].bits >= payload.data() + payload.size()))

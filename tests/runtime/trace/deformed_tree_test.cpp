@@ -95,7 +95,7 @@ DeformedTree tree_of(const BakedScene& scene, const DeformingGeometry& moving, c
           moving,
           record,
           traced.nodes.subspan(static_cast<size_t>(record.first_node), record.node_count),
-          std::span(traced.clusters).subspan(static_cast<size_t>(geometry.first_cluster), geometry.cluster_count),
+          traced.clusters().subspan(static_cast<size_t>(geometry.first_cluster), geometry.cluster_count),
           config};
 }
 

@@ -15,7 +15,7 @@ namespace packtrace {
 namespace {
 
 /// Balls of radius 1 in a row away from the eye.
-BakedFile row_of_balls(uint32_t count, bool proxies) {
+BakedFile row_of_balls(uint32_t count, bool proxies, bool trees = true) {
   Scene scene;
   scene.materials.emplace_back();
   scene.meshes.push_back(test::sphere_mesh(30));
@@ -23,6 +23,7 @@ BakedFile row_of_balls(uint32_t count, bool proxies) {
   for (uint32_t i = 0; i < count; ++i)
     scene.instances.push_back({0, Affine(test::translation(DVec3(i % 3, 0.0, 6.0 * (i + 1))))});
   BakeConfig config;
+  config.trees = trees;
   if (proxies) config.proxy.use = ProxyUse::kVoxels, config.proxy.voxels = 24;
   return BakedFile::from_bytes(test::bake(scene, config).bytes);
 }
@@ -57,8 +58,8 @@ void compare(Backend backend, uint32_t first_small) {
   for (uint32_t i = first_small; i < 30; ++i) small.push_back(i);
   TracerConfig config;
   config.backend = backend;
-  const ProxyTracer tracer(file, source, small, config);
   const std::unique_ptr<RayTracer> whole = make_tracer(source, &file, config);
+  const ProxyTracer tracer(*whole, file, source, small, config);
   const VoxelScene voxels(file, [&](uint32_t i) { return i >= first_small; });
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -109,6 +110,13 @@ TEST(ProxyTracer, AllInstancesMayBeSmall) {
   compare(Backend::kEmbree, 0);
 }
 
+uint64_t bytes_of(const RayTracer& tracer, std::string_view name) {
+  for (const ResidentPart& part : tracer.resident())
+    if (part.name == name) return part.bytes;
+  ADD_FAILURE() << name;
+  return 0;
+}
+
 TEST(ProxyTracer, InstancesSeenAsVoxelsTakeNoPlacements) {
   const BakedFile file = row_of_balls(300, true);
   const PackedSource source(file);
@@ -116,13 +124,31 @@ TEST(ProxyTracer, InstancesSeenAsVoxelsTakeNoPlacements) {
   for (uint32_t i = 20; i < 300; ++i) small.push_back(i);
   TracerConfig config;
   config.backend = Backend::kPacked;
-  const auto placements = [](const RayTracer& tracer) {
-    for (const ResidentPart& part : tracer.resident())
-      if (part.name == "placements") return part.bytes;
-    return uint64_t{0};
-  };
   const std::unique_ptr<RayTracer> whole = make_tracer(source, &file, config);
-  EXPECT_LT(placements(ProxyTracer(file, source, small, config)), placements(*whole) * 3 / 4);
+  const ProxyTracer tracer(*whole, file, source, small, config);
+  EXPECT_LT(bytes_of(tracer, "placements"), bytes_of(*whole, "placements") * 3 / 4);
+}
+
+TEST(ProxyTracer, TreesAndClustersAreThoseOfTheWholeTracer) {
+  const BakedFile file = row_of_balls(8, true, false);
+  ASSERT_TRUE(file.sections().trees.empty()); // both tracers would have to build them
+  const PackedSource source(file);
+  TracerConfig config;
+  config.backend = Backend::kPacked;
+  std::unique_ptr<RayTracer> whole = make_tracer(source, &file, config);
+  ASSERT_GT(bytes_of(*whole, "nodes built"), 0u);
+  const ProxyTracer tracer(*whole, file, source, {3, 4, 5, 6, 7}, config);
+  EXPECT_EQ(bytes_of(tracer, "nodes built"), 0u);
+  EXPECT_EQ(bytes_of(tracer, "cluster table"), 0u);
+  Ray ray;
+  ray.origin = Vec3(tracer.space().to_unit(DVec3(0.1, 0.1, 0.0) - file.origin())), ray.tfar = 100.0f;
+  ray.direction = Vec3(DVec3(0, 0, 1) / tracer.space().inverse_scale());
+  RayHit with, without;
+  tracer.closest_hits({&ray, 1}, kOcclusionRays, RayOrder::kIncoherent, {&with, 1});
+  whole.reset(); // the shared trees stay
+  tracer.closest_hits({&ray, 1}, kOcclusionRays, RayOrder::kIncoherent, {&without, 1});
+  EXPECT_TRUE(with.valid());
+  EXPECT_EQ(with.t, without.t);
 }
 
 } // namespace

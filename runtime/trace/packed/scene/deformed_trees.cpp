@@ -25,8 +25,7 @@ DeformedTrees::DeformedTrees(const BakedFile& file, std::span<const DeformingGeo
     geometries_.push_back(one.geometry);
     trees_[one.geometry] = std::make_unique<DeformedTree>(
         file, one, record, traced.nodes.subspan(static_cast<size_t>(record.first_node), record.node_count),
-        std::span(traced.clusters).subspan(static_cast<size_t>(geometry.first_cluster), geometry.cluster_count),
-        config);
+        traced.clusters().subspan(static_cast<size_t>(geometry.first_cluster), geometry.cluster_count), config);
   }
 }
 
@@ -56,7 +55,7 @@ void show_deformed(const DeformedTree& tree, uint32_t number, size_t first_clust
     traced.trees[number] = trace_tree(tree.nodes(), hull);
     if (number < traced.hulls.size()) traced.hulls[number] = hull;
   }
-  std::ranges::copy(tree.clusters(), traced.clusters.begin() + static_cast<ptrdiff_t>(first_cluster));
+  std::ranges::copy(tree.clusters(), traced.clusters().begin() + static_cast<ptrdiff_t>(first_cluster));
 }
 
 } // namespace packtrace

@@ -55,6 +55,7 @@ struct PackedTracer::Deformation {
 struct PackedTracer::Tables : TracedTrees {
   std::shared_ptr<DeformedTrees> deformed;
   bool follows = false;                         ///< `deformed` is another tracer's
+  bool shared = false;                          ///< nodes and clusters are another tracer's
   std::vector<baked::TreeRecord> records_shown; ///< of all trees, with the grids of the deforming ones
   struct DeformingTree {
     uint32_t geometry, tree; ///< geometry of the file
@@ -93,10 +94,29 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
   static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, shown, lod_trees_) : whole_trees(file);
   if (!t.deformed) t.deformed = std::make_shared<DeformedTrees>(file, deformation.geometries, deformation.config, t);
   if (deformation.any()) find_deforming();
+  finish(movers, !movers.instances.empty() || deformation.any() || !level_chains(file.sections().deformation).empty());
+}
+
+PackedTracer::PackedTracer(const PackedTracer& whole, const SceneSource& source)
+    : file_(whole.file_), source_(source), lod_(nullptr), kernels_(whole.kernels_),
+      tables_(std::make_unique<Tables>()) {
+  if (whole.lod_ != nullptr || !whole.tables_->deformed->geometries().empty())
+    throw Error(ErrorKind::kUsage, "trees of levels of detail and of deforming geometries are not shared");
+  Tables& t = *tables_;
+  static_cast<TracedTrees&>(t) = shared_trees(*whole.tables_);
+  t.shared = true;
+  t.deformed = std::make_shared<DeformedTrees>(file_, std::span<const DeformingGeometry>(), DeformConfig{}, t);
+  finish({}, false);
+}
+
+/// Places the instances and describes all for the kernels.
+/// @param keep_hulls whether placements may change
+void PackedTracer::finish(const Movers& movers, bool keep_hulls) {
+  Tables& t = *tables_;
   find_first_instances();
   place_all(movers);
-  if (movers.instances.empty() && !deformation.any() && level_chains(file.sections().deformation).empty()) t.hulls = {};
-  t.scene.clusters = t.clusters.data();
+  if (!keep_hulls) t.hulls = {};
+  t.scene.clusters = t.clusters().data();
   t.scene.trees = t.trees.data();
   set_callbacks();
 }
@@ -276,7 +296,7 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   surface.placement = &t.placed.surface(instance);
   surface.geometry = source_.instances()[instance].geometry;
   surface.triangle = triangle_of(hit.part, instance, hit.triangle);
-  if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kNeedsWideDecode) == 0) {
+  if (const packed::TraceCluster& cluster = t.clusters()[hit.part]; (cluster.flags & packed::kNeedsWideDecode) == 0) {
     decode_triangle(kernels_, cluster, hit.triangle, surface.vertices);
     return surface;
   }
@@ -347,9 +367,9 @@ std::vector<ResidentPart> PackedTracer::resident() const {
   uint64_t hull_bytes = 0;
   for (const std::optional<TreeHull>& hull : t.hulls) hull_bytes += hull ? hull->bytes() : 0;
   return {{"file", file_.file_bytes(), true},
-          {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
+          {"nodes built", t.built && !t.shared ? t.built->nodes.size() * sizeof(baked::PackedNode) : 0},
           {"deforming geometry", t.follows ? 0 : t.deformed->bytes()},
-          {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
+          {"cluster table", t.shared ? 0 : t.clusters().size() * sizeof(packed::TraceCluster)},
           {"placements", t.placed.bytes() + hull_bytes +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
           {"thread memory", ThreadMemoryOwner::bytes_of_all_threads(), true}};

@@ -41,6 +41,12 @@ public:
   /// @param leader tracer of the same file at LOD level 0; needed during this call only
   PackedTracer(const BakedFile& file, const LodSource& source, const PackedTracer& leader, PackedIsa isa = chosen_isa(),
                const Movers& movers = {});
+  /// Traces other instances of the file of a tracer of LOD level 0. Shares that tracer's nodes and clusters, so only
+  /// placements take memory.
+  /// @param whole needed during this call only
+  /// @param source must outlive the tracer
+  /// Throws Error(kUsage) if `whole` has levels of detail or deforming geometries.
+  PackedTracer(const PackedTracer& whole, const SceneSource& source);
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
   PackedTracer& operator=(const PackedTracer&) = delete;
@@ -119,6 +125,7 @@ private:
 
   PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
                const Movers& movers, const Deformation& deformation);
+  void finish(const Movers& movers, bool keep_hulls);
   void find_deforming();
   void show_deforming(uint32_t geometry, uint32_t tree);
   uint32_t file_geometry(uint32_t geometry) const;

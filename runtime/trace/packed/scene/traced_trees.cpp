@@ -38,9 +38,13 @@ bool needs_graded_pads(std::span<const baked::PackedNode> nodes, float max_coord
   return kVisiblePad * max_coordinate > *middle;
 }
 
-void add_tree(TracedTrees& t, uint32_t number) {
+std::span<const baked::PackedNode> nodes_of(const TracedTrees& t, uint32_t number) {
   const baked::TreeRecord& record = t.records[number];
-  const auto nodes = t.nodes.subspan(static_cast<size_t>(record.first_node), record.node_count);
+  return t.nodes.subspan(static_cast<size_t>(record.first_node), record.node_count);
+}
+
+void add_tree(TracedTrees& t, uint32_t number) {
+  const std::span<const baked::PackedNode> nodes = nodes_of(t, number);
   if (!nodes.empty()) t.hulls[number].emplace(nodes.data());
   t.trees.push_back(nodes.empty() ? packed::TraceTree{nodes.data(), 1.0f, 0} : trace_tree(nodes, *t.hulls[number]));
 }
@@ -54,13 +58,14 @@ void add_clusters(TracedTrees& t, const BakedFile& file, uint32_t number, uint32
   uint32_t next = 0;
   for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c)
     for (const uint32_t end = next + geometry.class_clusters[c]; next < end; ++next)
-      t.clusters[geometry.first_cluster + next] = trace_cluster(tree, geometry, file.cluster(g, next), ray_classes(c));
+      t.clusters()[geometry.first_cluster + next] =
+          trace_cluster(tree, geometry, file.cluster(g, next), ray_classes(c));
 }
 
 /// Returns trees with the arrays that are indexed by geometry or cluster allocated.
 TracedTrees make_room(const BakedFile& file, uint32_t geometry_count) {
   TracedTrees t;
-  t.clusters.resize(file.sections().clusters.size());
+  t.cluster_table = std::make_shared<std::vector<packed::TraceCluster>>(file.sections().clusters.size());
   t.tree_of.assign(geometry_count, baked::kNone);
   t.grid_of.assign(file.geometries().size(), baked::kNone);
   return t;
@@ -97,9 +102,9 @@ TracedTrees whole_trees(const BakedFile& file) {
   if (t.records.empty()) {
     BakedSections sections = file.sections();
     sections.geometries = sections.geometries.first(file.base_geometry_count());
-    t.built = build_packed_trees(sections);
-    t.records = t.built.trees;
-    t.nodes = t.built.nodes;
+    t.built = std::make_shared<const PackedTrees>(build_packed_trees(sections));
+    t.records = t.built->trees;
+    t.nodes = t.built->nodes;
   }
   uint32_t world = baked::kNone;
   for (uint32_t i = 0; i < t.records.size(); ++i) {
@@ -115,6 +120,15 @@ TracedTrees whole_trees(const BakedFile& file) {
     add_clusters(t, file, t.tree_of[g], g);
   }
   add_trees(t);
+  return t;
+}
+
+TracedTrees shared_trees(const TracedTrees& trees) {
+  TracedTrees t = trees;
+  t.hulls.assign(t.records.size(), std::nullopt);
+  for (uint32_t i = 0; i < t.records.size(); ++i)
+    if (const std::span<const baked::PackedNode> nodes = nodes_of(t, i); !nodes.empty())
+      t.hulls[i].emplace(nodes.data());
   return t;
 }
 
@@ -148,9 +162,9 @@ TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, std::sp
   const ChosenTreeBuilder builder(sections, chosen);
   cost.clusters_s = making_clusters.seconds();
   const Stopwatch building;
-  t.built = builder.build();
-  t.records = t.built.trees;
-  t.nodes = t.built.nodes;
+  t.built = std::make_shared<const PackedTrees>(builder.build());
+  t.records = t.built->trees;
+  t.nodes = t.built->nodes;
   cost.trees_s = building.seconds();
   for (uint32_t i = 0; i < chosen.size(); ++i) {
     const uint64_t leaves = builder.leaf_nodes(i);

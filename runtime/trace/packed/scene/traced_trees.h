@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,15 +16,18 @@ namespace packtrace {
 
 /// The trees that rays traverse, and the clusters in them as kernels read them.
 struct TracedTrees {
-  PackedTrees built; ///< owns trees that were built here
+  std::shared_ptr<const PackedTrees> built; ///< owns trees that were built here; null if they are the file's
   std::span<const baked::TreeRecord> records;
   std::span<const baked::PackedNode> nodes;
   std::vector<packed::TraceTree> trees;
   /// By tree, none for trees without nodes; kept while placements may change.
   std::vector<std::optional<TreeHull>> hulls;
-  std::vector<packed::TraceCluster> clusters; ///< by number in the cluster section
-  std::vector<uint32_t> tree_of;              ///< by the source's geometry: number of its tree, or baked::kNone
-  std::vector<uint32_t> grid_of;              ///< by the file's geometry: tree in whose grid its clusters are decoded
+  std::shared_ptr<std::vector<packed::TraceCluster>> cluster_table; ///< by number in the cluster section
+  std::vector<uint32_t> tree_of; ///< by the source's geometry: number of its tree, or baked::kNone
+  std::vector<uint32_t> grid_of; ///< by the file's geometry: tree in whose grid its clusters are decoded
+
+  std::span<packed::TraceCluster> clusters() { return *cluster_table; }
+  std::span<const packed::TraceCluster> clusters() const { return *cluster_table; }
 
   /// The transform from a tree's grid to object space, or to world space for the world tree.
   DAffine object_from_grid(uint32_t tree) const;
@@ -44,6 +48,10 @@ packed::TraceTree trace_tree(std::span<const baked::PackedNode> nodes, const Tre
 /// Returns the trees over LOD level 0: the file's trees, or trees built here if it holds none.
 /// @param file must outlive the result
 TracedTrees whole_trees(const BakedFile& file);
+
+/// Returns the same trees for other placements, with their hulls. Nodes and clusters are shared, not copied.
+/// @param trees none deforms
+TracedTrees shared_trees(const TracedTrees& trees);
 
 /// Builds the trees over the clusters of a plan's BLASes: one per BLAS, and a single one for all world-space geometry.
 /// @param file must outlive the result
