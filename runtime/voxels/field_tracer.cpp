@@ -8,6 +8,22 @@
 
 namespace packtrace {
 
+namespace {
+
+/// The normal of a hit, which does not point along the ray.
+glm::vec3 facing(glm::vec3 gradient, glm::vec3 way, bool from_inside) {
+  const float along = glm::dot(gradient, way);
+  if (gradient == glm::vec3(0.0f)) return -way; // deep inside, where all stored distances are equal
+  if (!(along > 0.0f)) return gradient;
+  if (from_inside) return -gradient;
+  // Where a ray grazes, interpolated distances may have begun to rise. The opposite normal would lead inside.
+  const glm::vec3 across = gradient - along * way;
+  const float length = glm::length(across);
+  return length > 1e-3f ? across / length : -way;
+}
+
+} // namespace
+
 glm::vec3 FieldTracer::gradient(glm::vec3 p) const {
   constexpr float kStep = 0.5f;
   glm::vec3 g;
@@ -42,10 +58,8 @@ std::optional<FieldHit> FieldTracer::first_hit(glm::dvec3 origin, glm::dvec3 dir
     const float signed_distance = field_->distance(p),
                 distance = has_sign_ ? signed_distance : std::abs(signed_distance);
     if (distance < (has_sign_ ? kSurface : kUnsignedSurface)) {
-      glm::vec3 normal = gradient(p);
-      if (normal == glm::vec3(0.0f)) normal = -way; // deep inside, where all stored distances are equal
-      if (glm::dot(normal, way) > 0.0f) normal = -normal;
-      return FieldHit{enter + double{t}, normal};
+      const bool from_inside = has_sign_ && t == 0.0f && signed_distance < 0.0f;
+      return FieldHit{enter + double{t}, facing(gradient(p), way, from_inside)};
     }
     t += std::max(kCaution * distance, kLeastStep);
   }

@@ -11,7 +11,7 @@ namespace packtrace {
 /// Where a ray meets the surface of a distance field.
 struct FieldHit {
   double t;
-  glm::vec3 normal; ///< unit: the field's gradient, towards the ray's origin
+  glm::vec3 normal; ///< unit, not along the ray: the field's gradient; its opposite if the ray begins inside
 };
 
 /// Traces rays through a distance field in its sample units: sample (i, j, k) lies at (i, j, k).

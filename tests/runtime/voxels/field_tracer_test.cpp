@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -50,6 +51,30 @@ TEST(FieldTracer, RaysMeetABallWhereItIs) {
   }
   EXPECT_EQ(wrong, 0u);
   EXPECT_GT(hits, 1000u);
+}
+
+/// Normals that point inside make spots of full occlusion.
+TEST(FieldTracer, NormalsOfGrazingRaysPointOutside) {
+  const auto distance = [](glm::vec3 p) { return glm::length(p - 32.0f) - 20.0f; };
+  const std::array<DistanceField, 2> fields = {field_of(distance),
+                                               field_of([&](glm::vec3 p) { return std::abs(distance(p)); })};
+  std::mt19937 random(8);
+  const auto uniform = [&] { return static_cast<double>(random() >> 8) * 0x1p-24; };
+  for (const bool has_sign : {true, false}) {
+    const FieldTracer tracer(fields[has_sign ? 0 : 1], has_sign);
+    uint64_t hits = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const auto direction = [&] { return glm::normalize(glm::dvec3(uniform(), uniform(), uniform()) - 0.5); };
+      const glm::dvec3 way = direction(), side = glm::normalize(glm::cross(way, direction()));
+      const glm::dvec3 eye = 32.0 + (20.0 + uniform() * (has_sign ? 0.1 : 0.7)) * side - 50.0 * way;
+      const auto hit = tracer.first_hit(eye, way, 0.0, 1e9);
+      if (!hit) continue;
+      ++hits;
+      ASSERT_GT(glm::dot(glm::dvec3(hit->normal), eye + hit->t * way - 32.0), 0.0) << i;
+      ASSERT_LT(glm::dot(glm::dvec3(hit->normal), way), 1e-3);
+    }
+    EXPECT_GT(hits, 2000u);
+  }
 }
 
 TEST(FieldTracer, OcclusionByTapsAndConesIsNearThatOfRays) {
