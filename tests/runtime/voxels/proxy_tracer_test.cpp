@@ -126,7 +126,7 @@ TEST(ProxyTracer, InstancesSeenAsVoxelsTakeNoPlacements) {
   config.backend = Backend::kPacked;
   const std::unique_ptr<RayTracer> whole = make_tracer(source, &file, config);
   const ProxyTracer tracer(*whole, file, source, small, config);
-  EXPECT_LT(bytes_of(tracer, "placements"), bytes_of(*whole, "placements") * 3 / 4);
+  EXPECT_LT(bytes_of(tracer, "placements"), bytes_of(*whole, "placements") / 5);
 }
 
 TEST(ProxyTracer, TreesAndClustersAreThoseOfTheWholeTracer) {

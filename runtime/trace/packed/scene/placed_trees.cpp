@@ -51,7 +51,7 @@ void PlacedTrees::place(const TracedTrees& trees, const SceneSource& source, std
   const std::span<const PlacedGeometry> instances = source.instances();
   movable_ = movable_instances(movers, instances.size());
   space_ = UnitSpace(bounds_of_motion(source, bounds, movers));
-  surfaces_.resize(instances.size());
+  slot_of_.assign(instances.size(), baked::kNone);
   flat_.assign(instances.size(), 0);
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const uint32_t tree = trees.tree_of[instances[i].geometry];
@@ -61,9 +61,11 @@ void PlacedTrees::place(const TracedTrees& trees, const SceneSource& source, std
     if (!movable_.empty() && movable_[i] != 0 && trees.records[tree].geometry == baked::kWorldTree)
       throw Error(ErrorKind::kUsage, "instance " + std::to_string(i) +
                                          " cannot move: it shares a tree with all other geometry in world space");
+    if (!movable_.empty()) give_slot(i); // places come and go
     flat_[i] =
         set_surface(i, instances[i].world_from_object, unit_from_grid(tree, instances[i].world_from_object)) ? 0 : 1;
   }
+  surfaces_.shrink_to_fit();
   list_placements();
   build_top();
   if (movable_.empty()) builder_ = {}; // its memory is needed again only if trees change
@@ -73,20 +75,27 @@ DAffine PlacedTrees::unit_from_grid(uint32_t tree, const Affine& world_from_obje
   return compose(compose(space_.unit_from_outer(), DAffine(world_from_object)), trees_->object_from_grid(tree));
 }
 
+void PlacedTrees::give_slot(uint32_t instance) {
+  slot_of_[instance] = static_cast<uint32_t>(surfaces_.size());
+  surfaces_.emplace_back();
+}
+
 /// Returns false if the instance is flat.
 bool PlacedTrees::set_surface(uint32_t instance, const Affine& world_from_object, const DAffine& unit_from_grid) {
   const std::optional<DAffine> placed = invertible_placement(unit_from_grid);
-  if (placed) surfaces_[instance] = exactly_instanced_placement(instance, DAffine(world_from_object), *placed);
-  return placed.has_value();
+  if (!placed) return false;
+  if (slot_of_[instance] == baked::kNone) give_slot(instance);
+  surfaces_[slot_of_[instance]] = exactly_instanced_placement(instance, DAffine(world_from_object), *placed);
+  return true;
 }
 
 /// Lists the placements of all instances that are not flat, and their boxes.
 void PlacedTrees::list_placements() {
   placements_.clear(), instance_of_.clear(), example_of_.clear(), boxes_.clear(), parts_.clear(),
       flat_instances_.clear();
-  if (!movable_.empty()) placement_of_.assign(surfaces_.size(), baked::kNone);
+  if (!movable_.empty()) placement_of_.assign(tree_of_instance_.size(), baked::kNone);
   bool world_placed = false;
-  for (uint32_t i = 0; i < surfaces_.size(); ++i) {
+  for (uint32_t i = 0; i < tree_of_instance_.size(); ++i) {
     const uint32_t tree = tree_of_instance_[i];
     if (tree == baked::kNone) continue;
     if (flat_[i] != 0) {
@@ -118,7 +127,7 @@ void PlacedTrees::add_placement(uint32_t instance, uint32_t example) {
   boxes_.emplace_back();
   if (parts_.size() < kMaxPlacementsWithParts) parts_.emplace_back();
   if (!movable_.empty()) placement_of_[example] = number;
-  update_placement(number, surfaces_[example].unit_from_surface);
+  update_placement(number, surface(example).unit_from_surface);
 }
 
 /// Computes what depends on a placement's transform. Its box is not enlarged.
@@ -140,7 +149,7 @@ void PlacedTrees::refit(uint32_t tree) {
     const TreeHull& hull = *trees_->hulls[tree];
     for (int axis = 0; axis < 3; ++axis)
       placements_[p].box_lo[axis] = hull.lo()[axis], placements_[p].box_hi[axis] = hull.hi()[axis];
-    update_placement(p, surfaces_[example_of_[p]].unit_from_surface);
+    update_placement(p, surface(example_of_[p]).unit_from_surface);
     if (enlarged) boxes_[p] = grown(boxes_[p]);
   }
 }
@@ -160,7 +169,7 @@ void PlacedTrees::move(std::span<const uint32_t> instances, std::span<const Affi
     flat_[i] = flat;
     const uint32_t placement = placement_of_[i];
     if (flat != 0 || placement == baked::kNone) return;
-    update_placement(placement, surfaces_[i].unit_from_surface);
+    update_placement(placement, surface(i).unit_from_surface);
     if (enlarged) boxes_[placement] = grown(boxes_[placement]);
   });
   if (relist.load()) list_placements();
@@ -199,7 +208,7 @@ void PlacedTrees::describe_top() {
   for (size_t p = 0; p < placements_.size(); ++p) {
     if (placements_[p].aligned == 0) continue;
     const double in_grid = trees_->trees[placements_[p].tree].max_coordinate;
-    const DAffine& unit_from_grid = surfaces_[example_of_[p]].unit_from_surface;
+    const DAffine& unit_from_grid = surface(example_of_[p]).unit_from_surface;
     for (int axis = 0; axis < 3; ++axis)
       max_coordinate = std::max(max_coordinate, static_cast<float>(in_grid * std::abs(unit_from_grid[axis][axis])));
   }
@@ -229,7 +238,7 @@ void PlacedTrees::fill_in(packed::KernelScene& scene) const {
 
 uint64_t PlacedTrees::bytes() const {
   return placements_.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + 2 * sizeof(uint32_t)) +
-         surfaces_.size() * (sizeof(Placement) + sizeof(uint32_t) + sizeof(uint8_t)) +
+         surfaces_.size() * sizeof(Placement) + tree_of_instance_.size() * (2 * sizeof(uint32_t) + sizeof(uint8_t)) +
          (top_.size() + parts_.size()) * sizeof(packed::TopNode) + movable_.size() * sizeof(uint8_t) +
          world_from_object_.size() * sizeof(Affine) + placement_of_.size() * sizeof(uint32_t) +
          moved_unit_from_grid_.capacity() * sizeof(DAffine) + builder_.bytes();

@@ -35,7 +35,8 @@ public:
   void fill_in(packed::KernelScene& scene) const;
 
   const UnitSpace& space() const { return space_; }
-  const Placement& surface(uint32_t instance) const { return surfaces_[instance]; }
+  /// @param instance is placed: not flat, with triangles
+  const Placement& surface(uint32_t instance) const { return surfaces_[slot_of_[instance]]; }
   /// The instance of a placement; baked::kNone for the world tree.
   uint32_t instance_of(uint32_t placement) const { return instance_of_[placement]; }
   std::span<const uint32_t> flat_instances() const { return flat_instances_; }
@@ -48,6 +49,7 @@ public:
   uint64_t bytes() const;
 
 private:
+  void give_slot(uint32_t instance);
   bool set_surface(uint32_t instance, const Affine& world_from_object, const DAffine& unit_from_grid);
   void list_placements();
   void add_placement(uint32_t instance, uint32_t example);
@@ -60,7 +62,8 @@ private:
   const TracedTrees* trees_ = nullptr;
   UnitSpace space_;
   std::vector<uint32_t> tree_of_instance_; ///< baked::kNone without triangles
-  std::vector<Placement> surfaces_;        ///< by instance
+  std::vector<uint32_t> slot_of_;          ///< by instance: in surfaces_; baked::kNone for those never placed
+  std::vector<Placement> surfaces_;        ///< with movers of all instances with triangles, else of the placed ones
   std::vector<uint8_t> flat_;              ///< by instance: 1 if it cannot be traced
   std::vector<uint32_t> flat_instances_;
   std::vector<packed::TracePlacement> placements_;
