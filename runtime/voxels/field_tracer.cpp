@@ -53,15 +53,17 @@ std::optional<FieldHit> FieldTracer::first_hit(glm::dvec3 origin, glm::dvec3 dir
   const auto length = static_cast<float>(leave - enter);
   // Interpolated distances may exceed the true ones a little: shorter steps do not pass through thin things.
   constexpr float kCaution = 0.85f, kLeastStep = 0.02f;
+  const float surface = has_sign_ ? kSurface : kUnsignedSurface;
   for (float t = 0.0f; t <= length;) {
     const glm::vec3 p = start + t * way;
     const float signed_distance = field_->distance(p),
                 distance = has_sign_ ? signed_distance : std::abs(signed_distance);
-    if (distance < (has_sign_ ? kSurface : kUnsignedSurface)) {
+    if (distance < surface) {
       const bool from_inside = has_sign_ && t == 0.0f && signed_distance < 0.0f;
       return FieldHit{enter + double{t}, facing(gradient(p), way, from_inside)};
     }
-    t += std::max(kCaution * distance, kLeastStep);
+    // Without signs a step must not end close to the surface, where the gradient would mix both of its sides.
+    t += std::max(kCaution * (has_sign_ ? distance : distance - surface), kLeastStep);
   }
   return std::nullopt;
 }

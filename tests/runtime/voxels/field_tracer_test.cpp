@@ -116,6 +116,7 @@ TEST(FieldTracer, SurfacesWithoutSignsStopRays) {
     const auto hit = tracer.first_hit({x, 60.0f, 31.3f}, {0, -1, 0}, 0.0f, 100.0f);
     ASSERT_TRUE(hit.has_value());
     ASSERT_NEAR(hit->t, 28.0f + (0.3f * (x - 32.0f) + 0.2f * -0.7f), 1.0f);
+    ASSERT_GT(glm::dot(hit->normal, up), 0.95f);
   }
 }
 
