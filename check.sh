@@ -44,9 +44,11 @@ fi
 for preset in "${presets[@]}"; do
   begin_stage "Configure ($preset)"
   # Scripts and the Python module are tested with Debian's interpreter, whichever comes first in the PATH.
-  # All presets with the same options, so that asan finds the objects of tests in ccache.
-  options=(-DPython_EXECUTABLE=/usr/bin/python3 -DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all)
-  [ "$preset" != release ] || options+=(-DPACKTRACE_BUILD_PYTHON=ON)
+  options=(-DPython_EXECUTABLE=/usr/bin/python3)
+  case $preset in # with the same options, asan finds the objects of tests in ccache
+    release) options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all -DPACKTRACE_BUILD_PYTHON=ON) ;;
+    asan) options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all) ;;
+  esac
   cmake --preset "$preset" "${options[@]}" >/dev/null
   [ "$preset" != release ] || { begin_stage "clang-tidy" && .ci/clang_tidy.sh; }
   begin_stage "Build ($preset)"

@@ -176,6 +176,8 @@ PngPalette png_palette(std::span<const std::byte> bytes, const std::string& comp
       std::memcpy(result.colours.data(), bytes.data() + data, length);
     } else if (type == "tRNS") { // hidden as an unknown chunk: it has another size in grey images
       std::memcpy(result.indices_as_grey.data() + at + 4, "tRNs", 4);
+      result.alphas.resize(std::min<size_t>(length, 256));
+      std::memcpy(result.alphas.data(), bytes.data() + data, result.alphas.size());
     } else if (type == "IDAT" && result.colours.empty()) {
       throw Error(ErrorKind::kInput, complaint + "no palette before the image data");
     }

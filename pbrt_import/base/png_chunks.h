@@ -33,6 +33,7 @@ PngHeader check_png_chunks(std::span<const std::byte> bytes, PngChecksums checks
 /// A palette image split into palette and indices, because decoders do not check that indices are in the palette.
 struct PngPalette {
   std::vector<std::array<uint8_t, 3>> colours; ///< in the order of the file
+  std::vector<uint8_t> alphas;                 ///< of the first colours; all others are opaque
   std::vector<std::byte> indices_as_grey;      ///< a greyscale PNG file of at most 8 bits whose values are the indices
   uint32_t grey_step = 1;                      ///< difference between the 8-bit grey values of consecutive indices
 };

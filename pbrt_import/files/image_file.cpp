@@ -107,23 +107,23 @@ std::unique_ptr<Sample, StbFree> decode_png(std::span<const std::byte> bytes, in
 }
 
 /// Mask of the pixels whose alpha is at least a cutoff.
-/// @param rgba 4 bytes per pixel
-std::vector<uint32_t> alpha_bits(const uint8_t* rgba, size_t width, size_t height, float cutoff) {
+/// @param alpha of the first pixel; that of the next is `stride` bytes behind it
+std::vector<uint32_t> alpha_bits(const uint8_t* alpha, size_t stride, size_t width, size_t height, float cutoff) {
   const size_t words = AlphaMask::row_words(static_cast<uint32_t>(width));
   std::vector<uint32_t> bits(words * height, 0);
-  const uint8_t* alpha = rgba + 3;
   for (size_t y = 0; y < height; ++y)
-    for (size_t x = 0; x < width; ++x, alpha += 4)
+    for (size_t x = 0; x < width; ++x, alpha += stride)
       if (static_cast<float>(*alpha) / 255.0f >= cutoff) bits[y * words + x / 32] |= 1u << (x % 32);
   return bits;
 }
 
-/// Pixels whose alpha is below 1.
-/// @param rgba 4 bytes per pixel
-uint64_t transparent_pixels(const uint8_t* rgba, size_t width, size_t height) {
-  uint64_t count = 0;
-  for (size_t i = 0; i < width * height; ++i) count += rgba[4 * i + 3] < 255;
-  return count;
+/// Adds what alpha tells to a summary: the number of pixels where it is below 1 at 8 bits, and the mask of a cutoff.
+/// @param alpha of the first pixel; that of the next is `stride` bytes behind it
+void add_alpha(ImageSummary& summary, const uint8_t* alpha, size_t stride, size_t width, size_t height,
+               ImageWants wants) {
+  if (wants.alpha)
+    for (size_t i = 0; i < width * height; ++i) summary.transparent += alpha[stride * i] < 255;
+  if (wants.mask && wants.alpha_cutoff) summary.nonzero = alpha_bits(alpha, stride, width, height, *wants.alpha_cutoff);
 }
 
 ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader& header, bool decode_srgb,
@@ -147,6 +147,14 @@ ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader&
   }
   ImageSummary summary = summarizer.finish();
   add_problem(summary, out_of_range, kNotInPalette, kNotInPaletteMany);
+  if (!wants.alpha && !(wants.mask && wants.alpha_cutoff)) return summary;
+  // Not by the decoder, whose palette is undefined behind its last entry.
+  std::vector<uint8_t> alpha(size_t{header.width} * header.height);
+  std::transform(grey.get(), grey.get() + alpha.size(), alpha.begin(), [&](stbi_uc value) {
+    const size_t index = value / palette.grey_step;
+    return index < palette.alphas.size() ? palette.alphas[index] : uint8_t{255};
+  });
+  add_alpha(summary, alpha.data(), 1, header.width, header.height, wants);
   return summary;
 }
 
@@ -171,11 +179,9 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
     summary = grey ? summarize_bytes<1>(pixels.get(), header.width, header.height, wants, linear)
                    : summarize_bytes<3>(pixels.get(), header.width, header.height, wants, linear);
   }
-  if (wants.alpha || (wants.mask && wants.alpha_cutoff)) {
+  if (!header.palette && (wants.alpha || (wants.mask && wants.alpha_cutoff))) {
     const auto rgba = decode_png(bytes, 4, stbi_load_from_memory);
-    if (wants.alpha) summary.transparent = transparent_pixels(rgba.get(), header.width, header.height);
-    if (wants.mask && wants.alpha_cutoff)
-      summary.nonzero = alpha_bits(rgba.get(), header.width, header.height, *wants.alpha_cutoff);
+    add_alpha(summary, rgba.get() + 3, 4, header.width, header.height, wants);
   }
   if (header.wrong_checksums > 0)
     summary.problems.push_back(header.wrong_checksums == 1
@@ -245,9 +251,7 @@ ImageSummary read_webp(std::span<const std::byte> bytes, bool decode_srgb, Image
     summarizer.add_row<3>(y, row.data(), linear);
   }
   ImageSummary summary = summarizer.finish();
-  if (wants.alpha) summary.transparent = transparent_pixels(pixels.data(), reader.width(), reader.height());
-  if (wants.mask && wants.alpha_cutoff)
-    summary.nonzero = alpha_bits(pixels.data(), reader.width(), reader.height(), *wants.alpha_cutoff);
+  add_alpha(summary, pixels.data() + 3, 4, reader.width(), reader.height(), wants);
   return summary;
 }
 

@@ -19,7 +19,7 @@ struct ImageSummary {
   uint32_t height = 0;               ///< pixels
   Vec3 average{0.0f};                ///< linear RGB; negative and non-finite values count as 0
   std::vector<std::string> problems; ///< damage that did not prevent reading
-  uint64_t transparent = 0;          ///< pixels whose alpha is below 1; 0 if not wanted
+  uint64_t transparent = 0;          ///< pixels whose alpha is below 1 at 8 bits; 0 if not wanted
   std::vector<uint8_t> rgb;          ///< layout of AlbedoTexture, clamped to [0, 1]; empty if not wanted or too large
   std::vector<uint32_t> nonzero;     ///< layout of AlphaMask; a bit is set if any channel is not 0, or see alpha_cutoff
   uint32_t map_width = 0;            ///< of `radiance`: that of the image, at most kMaxMapWidth

@@ -23,7 +23,8 @@ struct DracoPrimitive {
 using DracoWants = std::map<std::string, uint32_t>;
 
 /// Decodes a primitive. Attributes that the data lack are left out. Throws Error(kInput) if the data are damaged;
-/// MemoryError, before Draco allocates it, if they claim more than the budget has left.
+/// MemoryError, before Draco allocates it, if they claim more than the budget has left. Tables of symbols are not
+/// counted; Draco allocates at most 768 bytes per byte of data for them.
 /// @param extension the extension's object, which maps names to Draco's attribute numbers
 /// @param memory an empty reservation; it covers the result in the end
 DracoPrimitive decode_draco(std::span<const std::byte> compressed, const DracoWants& wants, const Value& extension,

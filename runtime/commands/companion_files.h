@@ -11,7 +11,8 @@
 namespace packtrace {
 
 /// The files beside the main file of an export. Unless keep() is called, the destructor removes those that were not
-/// there before, and their folder if it was not.
+/// there before, and their folder if it was not. Files that were replaced (force) stay replaced, and a second Ctrl-C
+/// ends the process without the destructor.
 class CompanionFiles {
 public:
   /// @param main the main file, whose folder the names are relative to

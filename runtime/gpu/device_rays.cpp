@@ -195,7 +195,7 @@ std::shared_ptr<DeviceView> DeviceRays::trace_view(const ViewRecord& view, std::
   s.follow_scene();
   require_few_pixels(view.width, view.height);
   const size_t pixels = size_t{view.width} * view.height;
-  if (!reused || reused->pixels() != pixels || reused->device() != s.device) {
+  if (!reused || reused.use_count() > 1 || reused->pixels() != pixels || reused->device() != s.device) {
     reused.reset();
     reused = std::make_shared<DeviceView>(s.device, pixels);
   }

@@ -22,6 +22,9 @@ struct DeviceTime {
 /// Camera and occlusion rays that are made on the device and never leave it. Not for several threads at once.
 class DeviceRays {
 public:
+  /// Called before each dispatch with the share of the call's work that is done; may throw.
+  using Watch = std::function<void(double share)>;
+
   /// @param scene must outlive this object
   explicit DeviceRays(const GpuScene& scene);
   ~DeviceRays();
@@ -31,8 +34,6 @@ public:
   DeviceTime trace_camera(const CameraRecord& camera, bool keep_rays);
   /// Makes a point of each pixel that was hit, lifted off its surface by a length of unit space.
   void make_points(float lift);
-  /// Called before each dispatch with the share of the call's work that is done; may throw.
-  using Watch = std::function<void(double share)>;
 
   /// Traces the rays of all pixels of a camera and reads their hits back.
   /// @param film PrimaryCamera::film_x() of all columns, then film_y() of all rows

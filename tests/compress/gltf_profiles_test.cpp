@@ -173,13 +173,16 @@ TEST_P(GltfProfiles, LatticesAreEqual) {
   const BakedScene again = bake_again(folder_ / "a.glb");
   const BakedFile back = BakedFile::from_bytes(again.bytes);
   const bool web = GetParam() == GltfProfile::kWeb;
+  ASSERT_FALSE(lattice_steps(file, web).empty());
   EXPECT_EQ(lattice_steps(back, web), lattice_steps(file, web));
   ASSERT_FALSE(instanced_faces(file).empty());
   EXPECT_EQ(instanced_faces(back), instanced_faces(file));
-  if (web)
+  if (web) {
+    ASSERT_FALSE(world_faces(file, std::nullopt, true).empty());
     EXPECT_EQ(world_faces(back, std::nullopt, true), world_faces(file, std::nullopt, true));
-  else
+  } else {
     EXPECT_EQ(world_faces(back), world_faces(file));
+  }
 }
 
 /// Adds a triangle whose mesh states its lattice.

@@ -68,6 +68,8 @@ TEST(PngImage, TransparentPixelsAreCounted) {
   const std::string entry = chunk("tRNS", "\xff\x20"s), palette = png(3, 1, 8, kPalette, "\0\0\1\1"s);
   EXPECT_EQ(transparent(palette), 0u);
   EXPECT_EQ(transparent(std::string(palette).insert(palette.find("IDAT") - 4, entry)), 2u);
+  const std::string damaged = png(3, 1, 8, kPalette, "\0\xff\1\1"s); // an index that the palette lacks is opaque
+  EXPECT_EQ(transparent(std::string(damaged).insert(damaged.find("IDAT") - 4, entry)), 2u);
 }
 
 TEST(PngImage, InterlacedPassesAreCountedRight) {

@@ -34,7 +34,7 @@ struct GltfLatticeBox {
 struct GltfPrimitive {
   PlainPrimitive plain;
   std::optional<DracoPrimitive> draco;
-  std::optional<MeshoptPrimitive> meshopt; ///< without the values of `plain`
+  std::optional<MeshoptPrimitive> meshopt; ///< if set, `plain` keeps only its material slot
 };
 
 /// The primitives of a geometry, and what they need to be stored.

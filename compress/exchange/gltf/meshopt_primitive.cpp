@@ -105,7 +105,7 @@ std::span<const std::byte> bytes_of_vector(const std::vector<T>& values) {
   return std::as_bytes(std::span(values));
 }
 
-/// Adds accessors of the stored values; return their numbers.
+/// Each adds an accessor of the stored values and returns its number.
 int add_positions(const std::vector<LatticePoint>& points, const PositionFrame& frame, MeshoptStreams& streams) {
   using Form = PositionFrame::Form;
   LatticePoint lo = points.front(), hi = lo;

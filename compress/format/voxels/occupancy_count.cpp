@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <bit>
+#include <unordered_map>
 
 #include "compress/format/voxels/occupancy_stream.h"
 
@@ -46,12 +47,24 @@ private:
     const uint64_t size = size_of(level, low);
     if (cell == Cell::kFull || size == 0) return size;
     const uint64_t node = stream_.node(level, bit);
-    // Nodes beyond a side of the grid count in part, and differently at each place.
-    const bool whole = size == uint64_t{1} << (3 * (last_ - level));
-    if (!whole || known_[level + 1].empty()) return of_node(level + 1, node, low, whole);
+    const uint32_t cut = cut_axes(level, low);
+    if (known_[level + 1].empty()) return of_node(level + 1, node, low, cut == 0);
+    if (cut != 0) {
+      const auto found = known_cut_[level + 1].find(8 * node + cut);
+      if (found != known_cut_[level + 1].end()) return found->second;
+      return known_cut_[level + 1][8 * node + cut] = of_node(level + 1, node, low, false);
+    }
     uint64_t& known = known_[level + 1][node];
     if (known == kUnknown) known = of_node(level + 1, node, low, true);
     return known;
+  }
+
+  /// Bit a: the cell extends beyond the grid's far side along axis a. Only the last cell along an axis does, so level
+  /// and cut axes determine the part of a node that counts.
+  uint32_t cut_axes(uint32_t level, const VoxelIndex& low) const {
+    uint32_t cut = 0;
+    for (uint32_t a = 0; a < 3; ++a) cut |= uint32_t{low[a] + (1u << (last_ - level)) > stream_.size()[a]} << a;
+    return cut;
   }
 
   uint64_t of_node(uint32_t level, uint64_t node, const VoxelIndex& low, bool whole) {
@@ -72,6 +85,7 @@ private:
   const OccupancyStream& stream_;
   uint32_t last_;
   std::array<std::vector<uint64_t>, voxels::kMaxLevels> known_; ///< by node; empty if no node is shared
+  std::array<std::unordered_map<uint64_t, uint64_t>, voxels::kMaxLevels> known_cut_; ///< by 8 * node + cut_axes()
 };
 
 } // namespace

@@ -114,7 +114,7 @@ struct OccupancyOptions {
 OccupancyStream encode_occupancy(const VoxelSet& set, const OccupancyOptions& options);
 
 /// Set voxels of a stream: those of every reference to a shared node, and of full cells. Takes time in the number of
-/// stored nodes and of cells at the grid's far sides, and 8 bytes per node if nodes are shared.
+/// stored nodes. If nodes are shared, takes 8 bytes per node, and a hash table of nodes at the grid's far sides.
 uint64_t count_occupied(const OccupancyStream& stream);
 
 /// All voxels of a stream.

@@ -177,7 +177,7 @@ TEST(MovingInstances, OfLevelsOfDetailArePlacedAsInANewTracer) {
 }
 
 TEST(MovingInstances, GiveTheSameTreeForAnyNumberOfThreads) {
-  const BakedScene baked(room_of(test::fewer(3000u)));
+  const BakedScene baked(room_of(3000));
   const Movers movers = movers_from(kStill, baked.source, kRoom);
   std::vector<std::vector<RayHit>> results;
   for (const size_t threads : {size_t{1}, size_t{2}, size_t{5}}) {
@@ -187,7 +187,7 @@ TEST(MovingInstances, GiveTheSameTreeForAnyNumberOfThreads) {
     std::vector<Affine> places;
     for (size_t i = 0; i < movers.instances.size(); ++i) places.push_back(motion.next());
     tracer.place_instances(movers.instances, places);
-    const std::vector<Ray> rays = random_rays(5000, {{-9, -1, -9}, {9, 7, 9}}, tracer.space());
+    const std::vector<Ray> rays = random_rays(test::fewer(5000u), {{-9, -1, -9}, {9, 7, 9}}, tracer.space());
     packed::KernelCounters counters;
     std::vector<RayHit> hits(rays.size());
     tracer.count_closest(rays, kCameraRays, hits, counters);

@@ -106,7 +106,7 @@ PackedTracer::PackedTracer(const PackedTracer& whole, const SceneSource& source)
   static_cast<TracedTrees&>(t) = shared_trees(*whole.tables_);
   t.shared = true;
   t.deformed = std::make_shared<DeformedTrees>(file_, std::span<const DeformingGeometry>(), DeformConfig{}, t);
-  finish({}, false);
+  finish({}, !level_chains(file_.sections().deformation).empty());
 }
 
 /// Places the instances and describes all for the kernels.
