@@ -71,7 +71,7 @@ std::string layout_of(const ExportOptions& options) {
   const std::string ending = ending_of(options.output);
   const auto known = std::ranges::find(kEndings, ending, &Ending::ending);
   refuse_foreign_ending(options.output, {".glb", ".gltf", ".v16", ".glsl", ".pbrt", ".obj", ".json"}, "export", {});
-  const std::string asked = options.streams.empty() ? options.layout : kStreams;
+  std::string asked = options.streams.empty() ? options.layout : kStreams;
   if (!options.streams.empty() && !options.layout.empty())
     throw Error(ErrorKind::kUsage, "--streams and --layout exclude each other");
   if (asked.empty() && known != kEndings.end() && known->layout != std::string_view(kStreams)) return known->layout;

@@ -37,7 +37,8 @@ void forget_motion(GBuffer& gbuffer) {
 /// @param still_frame number of frames since something moved
 float footprint_px(const FrameConfig& config, uint32_t still_frame) {
   if (!config.jitters()) return 1.0f;
-  return 1.0f / std::sqrt(static_cast<float>(still_frame / kFramesPerOffset + 1));
+  const uint32_t rounds = still_frame / kFramesPerOffset + 1; // of offsets, this one included
+  return 1.0f / std::sqrt(static_cast<float>(rounds));
 }
 
 FrameConfig validated(const FrameConfig& config, const FrameScene& scene) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "compress/format/deformation/deformation_view.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/bounds.h"
 #include "runtime/trace/packed/scene/deformed_trees.h"
 #include "runtime/trace/packed/scene/placed_trees.h"
