@@ -10,7 +10,7 @@ namespace packtrace {
 namespace {
 
 using Pixels = tbb::blocked_range<size_t>;
-constexpr size_t kPixelsAtOnce = 1u << 16; ///< of a thread
+constexpr size_t kPixelsAtOnce = 1u << 16; ///< pixels of a task; fixed, so that sums do not depend on the threads
 
 } // namespace
 

@@ -136,6 +136,16 @@ struct DeviceRays::State {
   template <typename Threads>
   DeviceTime run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples, Pace& pace,
                      const Threads& threads, const Watch& watch);
+  /// Runs a kernel that traces a ray through each pixel, in blocks of 8 x 4 pixels.
+  DeviceTime run_pixels(Kernel& kernel, std::span<const Buffer* const> buffers, uint32_t width, uint32_t height,
+                        uint32_t ray_class, bool keep_rays, const Watch& watch) {
+    for (uint32_t i = 0; i < buffers.size(); ++i) kernel.bind(kFirstBinding + i, *buffers[i]);
+    TimedDispatches dispatches(*device, camera_pace, 1, most_threads(), watch);
+    return dispatches.all(uint64_t{blocks_of(width, height)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
+      const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), ray_class, keep_rays ? 1u : 0u};
+      return device->run(kernel, push_bytes(span), groups_of(count));
+    });
+  }
   /// Binds the scene's current buffers to the kernels, and drops those that were made for another kind of scene.
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
@@ -162,14 +172,7 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   s.cameras = upload(s.device, push_bytes(camera), "the camera");
   if (!s.camera_kernel) s.camera_kernel = s.scene.make_kernel(spirv::camera(), kFirstBinding + 3, sizeof(SpanRecord));
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
-  for (uint32_t i = 0; i < std::size(buffers); ++i) s.camera_kernel->bind(kFirstBinding + i, *buffers[i]);
-  TimedDispatches dispatches(*s.device, s.camera_pace, 1, s.most_threads(), {});
-  return dispatches.all(uint64_t{blocks_of(camera.width, camera.height)} * 32, kThreads,
-                        [&](uint64_t first, uint64_t count) {
-                          const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count),
-                                                baked::kVisibleToCamera, keep_rays ? 1u : 0u};
-                          return s.device->run(*s.camera_kernel, push_bytes(span), groups_of(count));
-                        });
+  return s.run_pixels(*s.camera_kernel, buffers, camera.width, camera.height, baked::kVisibleToCamera, keep_rays, {});
 }
 
 void DeviceRays::make_points(float lift) {
@@ -208,12 +211,7 @@ std::shared_ptr<DeviceView> DeviceRays::trace_view(const ViewRecord& view, std::
   if (!s.view_kernel) s.view_kernel = s.scene.make_kernel(spirv::view(), kFirstBinding + 3, sizeof(SpanRecord));
   const StagedBuffer& hits = reused->hits_buffer();
   const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &hits.device()};
-  for (uint32_t i = 0; i < std::size(buffers); ++i) s.view_kernel->bind(kFirstBinding + i, *buffers[i]);
-  TimedDispatches dispatches(*s.device, s.camera_pace, 1, s.most_threads(), watch);
-  dispatches.all(uint64_t{blocks_of(view.width, view.height)} * 32, kThreads, [&](uint64_t first, uint64_t count) {
-    const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), ray_class, 0};
-    return s.device->run(*s.view_kernel, push_bytes(span), groups_of(count));
-  });
+  s.run_pixels(*s.view_kernel, buffers, view.width, view.height, ray_class, false, watch);
   s.device->copy(hits.device(), hits.host(), 0, 0, pixels * sizeof(packed::KernelHit));
   return reused;
 }
