@@ -1,5 +1,8 @@
 #include "runtime/voxels/voxel_tracer.h"
 
+#include <algorithm>
+#include <bit>
+
 #include "runtime/simd.h"
 #include "runtime/voxels/voxel_walk.h"
 
@@ -13,23 +16,47 @@ public:
 
   /// Whether a voxel is set; if not, `shift` says how large the empty cell around it is.
   [[gnu::always_inline]] bool test(VoxelIndex v, uint32_t& shift) {
-    const uint32_t difference = (v[0] ^ before_[0]) | (v[1] ^ before_[1]) | (v[2] ^ before_[2]);
-    while (depth_ > 0 && difference >> (last_ - depth_ + 1) != 0) --depth_;
+    const auto difference =
+        static_cast<uint32_t>(std::bit_width((v[0] ^ before_[0]) | (v[1] ^ before_[1]) | (v[2] ^ before_[2])));
+    depth_ = std::min(depth_, last_ + 1 - std::min(difference, last_ + 1));
     before_ = v;
-    for (;; ++depth_) {
-      const uint32_t s = last_ - depth_;
-      const uint64_t bit =
-          depth_ == 0 ? top_bit(v) : 8 * node_[depth_] + (v[0] >> s & 1) + 2 * (v[1] >> s & 1) + 4 * (v[2] >> s & 1);
-      if (depth_ == last_ || !stream_.mask_bit(depth_, bit)) {
-        shift = s;
-        if (depth_ == last_) return stream_.mask_bit(depth_, bit);
-        return has_full_ && stream_.cell(depth_, bit) == OccupancyStream::Cell::kFull;
+    for (;;) {
+      shift = last_ - depth_;
+      if (depth_ == 0) {
+        const uint64_t bit = top_bit(v);
+        if (!stream_.mask_bit(0, bit)) return is_full(0, bit);
+        open(stream_.node(0, bit));
+        continue;
       }
-      node_[depth_ + 1] = stream_.node(depth_, bit);
+      Node& node = node_[depth_];
+      const uint32_t octant = (v[0] >> shift & 1) + 2 * (v[1] >> shift & 1) + 4 * (v[2] >> shift & 1);
+      if ((node.mask >> octant & 1) == 0) return depth_ < last_ && is_full(depth_, 8 * node.number + octant);
+      if (depth_ == last_) return true;
+      if (node.rank == kUnknown) node.rank = stream_.rank(depth_, 8 * node.number);
+      const auto before = static_cast<uint32_t>(std::popcount(node.mask & ((1u << octant) - 1)));
+      open(stream_.node_of_edge(depth_, node.rank + before));
     }
   }
 
 private:
+  static constexpr uint64_t kUnknown = ~uint64_t{0};
+
+  struct Node {
+    uint64_t number;
+    uint64_t rank; ///< set bits of its level before it; kUnknown until it is needed
+    uint32_t mask;
+  };
+
+  /// Goes down to a node.
+  [[gnu::always_inline]] void open(uint64_t number) {
+    ++depth_;
+    node_[depth_] = {number, kUnknown, stream_.mask(depth_, number)};
+  }
+
+  bool is_full(uint32_t level, uint64_t bit) const {
+    return has_full_ && stream_.cell(level, bit) == OccupancyStream::Cell::kFull;
+  }
+
   uint64_t top_bit(VoxelIndex v) const {
     const auto& top = stream_.header().top;
     return (uint64_t{v[2] >> last_} * top[1] + (v[1] >> last_)) * top[0] + (v[0] >> last_);
@@ -40,7 +67,7 @@ private:
   const bool has_full_ = (stream_.header().flags & voxels::kHasFull) != 0;
   uint32_t depth_ = 0; // level of the deepest node that holds before_
   VoxelIndex before_{};
-  std::array<uint64_t, voxels::kMaxLevels> node_{};
+  std::array<Node, voxels::kMaxLevels> node_; // by level, from 1 to depth_
 };
 
 template <class Real>

@@ -19,8 +19,8 @@
 #include "compress/format/voxels/cell_pyramid.h"
 #include "compress/format/voxels/proxy_codec.h"
 #include "compress/format/voxels/proxy_section.h"
-#include "runtime/stopwatch.h"
 #include "runtime/voxels/voxel_tracer.h"
+#include "tests/benchmarks/thread_cpu_time.h"
 
 namespace packtrace {
 namespace {
@@ -53,18 +53,6 @@ uint64_t octree_bits(const VoxelSet& set) {
   return 8 * nodes;
 }
 
-/// Best of three.
-template <class Trace>
-double seconds_of(const Trace& trace) {
-  double best = 1e300;
-  for (int run = 0; run < 3; ++run) {
-    const Stopwatch watch;
-    trace();
-    best = std::min(best, watch.seconds());
-  }
-  return best;
-}
-
 void compare(const Proxy& proxy, size_t ray_count) {
   const VoxelSet set = decode_occupancy(proxy.voxels);
   openvdb::MaskGrid source; // NanoVDB's own builder makes no grids without values
@@ -79,13 +67,13 @@ void compare(const Proxy& proxy, size_t ray_count) {
   const std::vector<BenchmarkRay> rays = make_rays(proxy.voxels.size(), ray_count);
   std::vector<float> ours(rays.size()), theirs(rays.size());
   const VoxelTracer tracer(proxy.voxels);
-  const double our_s = seconds_of([&] {
+  const auto trace_ours = [&] {
     for (size_t i = 0; i < rays.size(); ++i) {
       const auto hit = tracer.first_hit(rays[i].origin, rays[i].direction, 0.0f, 1e30f);
       ours[i] = hit ? hit->t : -1.0f;
     }
-  });
-  const double their_s = seconds_of([&] {
+  };
+  const auto trace_theirs = [&] {
     auto accessor = grid->getAccessor();
     using RayT = nanovdb::Ray<float>;
     const auto bbox = grid->tree().bbox();
@@ -104,7 +92,8 @@ void compare(const Proxy& proxy, size_t ray_count) {
         break;
       } while (hdda.step());
     }
-  });
+  };
+  const std::vector<double> ms = median_cpu_ms({trace_ours, trace_theirs}, 5);
   uint64_t hits = 0, different = 0;
   for (size_t i = 0; i < rays.size(); ++i) {
     hits += ours[i] >= 0.0f;
@@ -121,8 +110,9 @@ void compare(const Proxy& proxy, size_t ray_count) {
       static_cast<double>(proxy.voxels.bits()) / static_cast<double>(set.count()),
       static_cast<double>(octree_bits(set)) / static_cast<double>(set.count()),
       static_cast<unsigned long long>(proxy.voxels.bits() / 8), static_cast<unsigned long long>(handle.size()),
-      static_cast<double>(proxy.voxels.bits() / 8) / static_cast<double>(handle.size()), mrays(our_s), mrays(their_s),
-      their_s / our_s, static_cast<unsigned long long>(hits), static_cast<unsigned long long>(different));
+      static_cast<double>(proxy.voxels.bits() / 8) / static_cast<double>(handle.size()), mrays(1e-3 * ms[0]),
+      mrays(1e-3 * ms[1]), ms[1] / ms[0], static_cast<unsigned long long>(hits),
+      static_cast<unsigned long long>(different));
 }
 
 } // namespace

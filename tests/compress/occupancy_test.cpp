@@ -91,12 +91,12 @@ TEST(Occupancy, SharingEqualSubtreesTakesFewerBits) {
   EXPECT_TRUE(decode_occupancy(dag) == set);
 }
 
-TEST(Occupancy, TheIndexTakesThreePercentOfTheMasks) {
+TEST(Occupancy, TheIndexTakesOneAndAHalfPercentOfTheMasks) {
   const OccupancyStream stream = encode_occupancy(ball({300, 300, 300}, 140.0, false), {});
   uint64_t ranked = 0;
   for (uint32_t l = 0; l + 1 < stream.levels(); ++l) ranked += stream.header().level[l].mask_bits;
-  EXPECT_GT(stream.index_bits(), ranked / 33);
-  EXPECT_LT(stream.index_bits(), ranked / 28);
+  EXPECT_GT(stream.index_bits(), ranked / 66);
+  EXPECT_LT(stream.index_bits(), ranked / 56);
 }
 
 TEST(Occupancy, BytesAreFixed) {

@@ -26,12 +26,14 @@ int field(int word, int bit, int width) {
   return int(value & (1u << width) - 1u);
 }
 
-// Set bits of a level before one.
+// Set bits of a level before one, counted from the nearest block of 1024.
 int rank(int level, int bit) {
-  int block = bit >> 9, group = block >> 6, word = MASKS[level] + block * 16, last = MASKS[level] + (bit >> 5);
+  int block = min(bit + 512 >> 10, GROUPS[level] - MASKS[level] - 1 >> 5), group = block >> 6;
+  int word = MASKS[level] + (bit >> 5), start = MASKS[level] + block * 32;
   uint sum = group > 0 ? WORDS[GROUPS[level] + group - 1] : 0u;
   if (block > 0) sum += WORDS[BLOCKS[level] + (block - 1 >> 1)] >> 16 * (block - 1 & 1) & 0xffffu;
-  for (; word < last; ++word) sum += count_bits(WORDS[word]);
+  for (int i = start; i < word; ++i) sum += count_bits(WORDS[i]);
+  for (int i = word; i < start; ++i) sum -= count_bits(WORDS[i]);
   return int(sum + count_bits(WORDS[word] & (1u << (bit & 31)) - 1u));
 }
 

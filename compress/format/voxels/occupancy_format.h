@@ -8,7 +8,7 @@
 namespace packtrace::voxels {
 
 inline constexpr uint32_t kMinLevels = 2, kMaxLevels = 16;
-inline constexpr uint32_t kRankBits = 512;       ///< mask bits per rank block
+inline constexpr uint32_t kRankBits = 1024;      ///< mask bits per rank block
 inline constexpr uint32_t kRankGroupBlocks = 64; ///< rank blocks per group, whose start has a 32-bit rank
 inline constexpr uint32_t kMaxSwatches = 256;
 

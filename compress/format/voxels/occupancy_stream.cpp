@@ -16,8 +16,8 @@ OccupancyStream::OccupancyStream(const OccupancyHeader& header, std::vector<uint
     place.masks = at;
     at += words_for_bits(level.mask_bits);
     place.groups = at;
-    const uint64_t blocks = level.mask_bits == 0 ? 0 : (level.mask_bits - 1) / kRankBits;
-    place.blocks = place.groups + blocks / kRankGroupBlocks;
+    place.last_block = level.mask_bits == 0 ? 0 : (level.mask_bits - 1) / kRankBits;
+    place.blocks = place.groups + place.last_block / kRankGroupBlocks;
     if (!last || header.swatch_bits > 0) at += rank_words(level.mask_bits);
     place.full = at;
     if (!last && (header.flags & kHasFull) != 0) at += words_for_bits(level.mask_bits - level.set_bits);

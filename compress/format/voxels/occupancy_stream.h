@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -28,6 +30,7 @@ public:
   /// Where a level's parts start, in words.
   struct LevelPlace {
     uint64_t masks = 0, groups = 0, blocks = 0, full = 0, pointers = 0;
+    uint64_t last_block = 0; ///< number of the last block of ranks
   };
 
   OccupancyStream() = default;
@@ -61,8 +64,9 @@ public:
     return read_bit(places_[level].full, bit - rank(level, bit)) ? Cell::kFull : Cell::kEmpty;
   }
   /// Node of the next level that belongs to a set bit.
-  uint64_t node(uint32_t level, uint64_t bit) const {
-    const uint64_t edge = rank(level, bit);
+  uint64_t node(uint32_t level, uint64_t bit) const { return node_of_edge(level, rank(level, bit)); }
+  /// Node of the next level that belongs to the set bit of this rank.
+  uint64_t node_of_edge(uint32_t level, uint64_t edge) const {
     const uint32_t width = header_.level[level + 1].pointer_bits;
     return width == 0 ? edge : read_field(places_[level + 1].pointers, edge * width, width);
   }
@@ -71,23 +75,36 @@ public:
   uint32_t mask(uint32_t level, uint64_t node) const {
     return words_[places_[level].masks + node / 4] >> (8 * (node % 4)) & 0xffu;
   }
-  /// Set bits of a level's masks before `bit`. Reads at most 16 words and two ranks. Not for a last level without
-  /// swatches.
-  uint64_t rank(uint32_t level, uint64_t bit) const {
+  /// Set bits of a level's masks before `bit`, counted from the nearest block: reads at most 16 words (32 in the last
+  /// block of a level) and two ranks. Not for a last level without swatches.
+  [[gnu::always_inline]] uint64_t rank(uint32_t level, uint64_t bit) const {
     const LevelPlace& place = places_[level];
-    const uint64_t block = bit / voxels::kRankBits, group = block / voxels::kRankGroupBlocks;
+    const uint64_t block = std::min((bit + voxels::kRankBits / 2) / voxels::kRankBits, place.last_block),
+                   group = block / voxels::kRankGroupBlocks;
     uint64_t rank = group == 0 ? 0 : words_[place.groups + group - 1];
     if (block > 0) rank += words_[place.blocks + (block - 1) / 2] >> (16 * ((block - 1) % 2)) & 0xffffu;
-    uint64_t word = place.masks + block * (voxels::kRankBits / 32);
-    for (const uint64_t last = place.masks + bit / 32; word < last; ++word)
-      rank += static_cast<uint64_t>(std::popcount(words_[word]));
-    return rank + static_cast<uint64_t>(std::popcount(words_[word] & ((1u << (bit % 32)) - 1)));
+    const uint64_t word = place.masks + bit / 32, start = place.masks + block * (voxels::kRankBits / 32);
+    rank += static_cast<uint64_t>(std::popcount(words_[word] & ((1u << (bit % 32)) - 1)));
+    const uint64_t between = set_bits(std::min(word, start), std::max(word, start));
+    return word >= start ? rank + between : rank - between;
   }
   uint32_t read_field(uint64_t word, uint64_t bit, uint32_t width) const {
     return read_packed(words_.data() + word, bit, width);
   }
 
 private:
+  /// Set bits of the words first..last - 1.
+  [[gnu::always_inline]] uint64_t set_bits(uint64_t first, uint64_t last) const {
+    const uint32_t* word = words_.data() + first;
+    const uint32_t* const end = words_.data() + last;
+    uint64_t sum = 0;
+    for (; end - word >= 2; word += 2) {
+      uint64_t pair;
+      std::memcpy(&pair, word, sizeof pair);
+      sum += static_cast<uint64_t>(std::popcount(pair));
+    }
+    return word == end ? sum : sum + static_cast<uint64_t>(std::popcount(*word));
+  }
   bool read_bit(uint64_t word, uint64_t bit) const { return (words_[word + bit / 32] >> (bit % 32) & 1) != 0; }
   /// Bit of the last level that holds a voxel; none if a level above decides, then `full` says how.
   std::optional<uint64_t> leaf_bit(VoxelIndex voxel, bool& full) const;

@@ -11,7 +11,7 @@ namespace packtrace::voxels {
 
 /// Bit of SummaryRecord::purpose: the file has proxies.
 inline constexpr uint32_t kHasProxies = 1u << 16;
-inline constexpr uint32_t kProxyVersion = 1;
+inline constexpr uint32_t kProxyVersion = 2;
 
 enum ProxyKind : uint32_t { kVoxelProxy, kFieldProxy, kProxyKinds };
 
