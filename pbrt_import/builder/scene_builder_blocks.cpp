@@ -3,6 +3,7 @@
 
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/builder/scene_builder.h"
+#include "pbrt_import/scene/flattening.h"
 #include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/text/tokenizer.h"
 
@@ -116,6 +117,10 @@ void SceneBuilder::add_instance(const Directive& directive) {
   const Affine world_from_object(placement.map);
   if (!is_invertible(DAffine(world_from_object)))
     return reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
+  if (flattens(DAffine(world_from_object)))
+    reporter_.warning(directive.place,
+                      "the instance's transform flattens it (a scale near 0?): its extents differ by a "
+                      "factor of more than a million; voxels and distance fields leave it out");
   reserve_one_more(scene_.instances);
   if (placement.animation != kNotAnimated)
     scene_.animated_instances.push_back({static_cast<uint32_t>(scene_.instances.size()), placement.animation});

@@ -32,8 +32,7 @@ std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& 
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const baked::GeometryRecord& geometry = file.geometries()[instances[i].geometry];
     if (has_proxy[instances[i].geometry] == 0 || (geometry.flags & baked::kWorldSpace) != 0) continue;
-    const double determinant = glm::determinant(glm::dmat3(DAffine(instances[i].world_from_object)));
-    if (determinant == 0.0 || !std::isfinite(determinant)) continue;
+    if (flattens(DAffine(instances[i].world_from_object), object_bounds(geometry), source.world_bounds())) continue;
     const Bounds box = placed_box_of(file, instances[i]);
     const double diameter = box.diagonal();
     const double distance = std::max(glm::distance(box.centre(), view.eye()) - 0.5 * diameter, 0.0);
