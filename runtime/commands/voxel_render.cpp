@@ -1,6 +1,7 @@
 #include "runtime/commands/voxel_render.h"
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -15,6 +16,7 @@
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/commands/render_camera.h"
+#include "runtime/frame/frame_loop.h"
 #include "runtime/image/background.h"
 #include "runtime/image/png.h"
 #include "runtime/stopwatch.h"
@@ -31,14 +33,10 @@ void refuse_other_options(const RenderOptions& options) {
   const AoOptions &ao = options.ao, &ao_defaults = defaults.ao;
   const bool sequence = options.sequence.path || options.sequence.keys || options.sequence.start_time;
   const bool denoiser = options.denoiser != defaults.denoiser || !options.denoiser_settings.empty();
-  const std::array<std::pair<const char*, bool>, 20> given = {{
+  const std::array<std::pair<const char*, bool>, 16> given = {{
       {"--aov", !options.aovs.empty()},
-      {"--frames", options.frames.has_value()},
       {"--ground-truth", options.ground_truth},
-      {"--supersample", options.supersample != 1},
-      {"--no-jitter", options.no_jitter},
       {"--no-legend", options.no_legend},
-      {"--seed", options.seed != 0},
       {"the denoiser's options", denoiser},
       {"--ao-resolution", ao.resolution != ao_defaults.resolution},
       {"--ao-rate", ao.rate != ao_defaults.rate},
@@ -67,6 +65,32 @@ Image picture_of(const VoxelPicture& traced, ImageSize size) {
   return image;
 }
 
+/// What to do for a picture of proxies that the input does not have.
+[[noreturn]] void fail_without_proxies(const RenderOptions& options, const LoadedScene& loaded,
+                                       const VoxelScene* scene) {
+  const std::string& view = options.shade.view;
+  const bool other = scene != nullptr && !scene->proxies().empty();
+  const std::string holds = !loaded.baked ? "only .ptk files have proxies"
+                            : other
+                                ? "its proxies are " + std::string(view == kFieldView ? "voxels" : "distance fields")
+                                : "it has no proxies";
+  const std::string source = !loaded.baked ? options.input : "its scene";
+  throw FileError(ErrorKind::kUnsupported, options.input,
+                  holds + ": bake " + source + " with --proxy " + view +
+                      (other ? ", or use --view " + std::string(view == kFieldView ? kVoxelView : kFieldView) : ""));
+}
+
+/// The camera of one of a pixel's rays: parts of the pixel (--supersample) in turn, shifted from frame to frame as in
+/// other views.
+std::function<PrimaryCamera(uint32_t)> pixel_views(const Camera& camera, const StillConfig& still) {
+  return [&camera, &still](uint32_t view) {
+    const uint32_t n = still.supersample, part = view % (n * n);
+    const glm::dvec2 shift = still.jitter ? jitter_offset(view / (n * n)) : glm::dvec2(0.0);
+    return PrimaryCamera(camera, still.size,
+                         (glm::dvec2(part % n, part / n) + 0.5 + shift) / static_cast<double>(n) - 0.5);
+  };
+}
+
 } // namespace
 
 bool views_proxies(const RenderOptions& options) {
@@ -86,18 +110,17 @@ int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
   const std::optional<VoxelScene> scene =
       loaded.baked ? std::optional<VoxelScene>(std::in_place, *loaded.baked) : std::nullopt;
   if (!scene || scene->proxies().empty() || scene->proxies().front().is_field() != (options.shade.view == kFieldView))
-    throw FileError(ErrorKind::kUnsupported, options.input,
-                    "it has no such proxies; bake it with --proxy " + options.shade.view);
+    fail_without_proxies(options, loaded, scene ? &*scene : nullptr);
   const ChosenCamera chosen = choose_camera(*loaded.source, options, globals);
   const StillConfig still = make_config(*loaded.source, chosen.camera, options, {});
-  const PrimaryCamera camera(chosen.camera, still.size);
-  const MemoryReservation pixels(globals.memory, still.size.pixels() * 48, "a picture");
+  const MemoryReservation pixels(globals.memory, still.size.pixels() * 64, "a picture");
   VoxelPictureConfig config;
-  config.samples = options.spp.value_or(config.samples);
+  config.views = still.frames * still.supersample * still.supersample;
+  config.samples = still.ao.spp, config.seed = static_cast<uint32_t>(still.ao.seed ^ still.ao.seed >> 32);
   config.radius = static_cast<double>(still.ao.radius);
-  progress.begin("tracing voxels", still.size.height);
+  progress.begin("tracing proxies", uint64_t{config.views} * still.size.height);
   const Stopwatch tracing;
-  const VoxelPicture traced = trace_voxel_picture(*scene, camera, config, progress);
+  const VoxelPicture traced = trace_voxel_picture(*scene, pixel_views(chosen.camera, still), config, progress);
   const double seconds = tracing.seconds();
   const Background background = parse_background(options.background.value_or("c8ccd8"));
   output.write(
@@ -117,6 +140,9 @@ int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
                 {"outputs", options.outputs},
                 {"width", still.size.width},
                 {"height", still.size.height},
+                {"frames", still.frames},
+                {"supersample", still.supersample},
+                {"spp", still.ao.spp},
                 {"instances", scene->instance_count()},
                 {"instances_without_proxy", scene->instances_without_proxy()},
                 {"flat_instances", scene->flat_instances()},

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "compress/format/voxels/proxy_section.h"
+#include "pbrt_import/scene/flattening.h"
 #include "runtime/voxels/field_tracer.h"
 #include "runtime/voxels/voxel_tracer.h"
 
@@ -50,6 +51,11 @@ std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction
 
 } // namespace
 
+bool flattens(const DAffine& world_from_object, const Bounds& object, const Bounds& world) {
+  return flattens(world_from_object) ||
+         !(transform_bounds(world_from_object, object).diagonal() > 0x1p-24 * world.diagonal());
+}
+
 VoxelScene::VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)>& wanted) {
   if (const std::span<const uint8_t> bytes = proxy_bytes(file); !bytes.empty()) proxies_ = read_proxies(bytes);
   constexpr uint32_t kNone = ~0u;
@@ -63,35 +69,49 @@ VoxelScene::VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)
       continue;
     }
     if (wanted && !wanted(i)) continue;
-    const VoxelFrame frame = proxies_[number].frame();
-    const DAffine world_from_grid = compose(DAffine(file.world_from_object(i)), grid_placement(frame));
-    const DAffine grid_from_world = inverse(world_from_grid);
-    if (!is_finite(grid_from_world[0]) || !is_finite(grid_from_world[1]) || !is_finite(grid_from_world[2]) ||
-        !is_finite(grid_from_world[3])) {
+    const DAffine world_from_object(file.world_from_object(i));
+    if (flattens(world_from_object, object_bounds(file.geometries()[file.instances()[i].geometry]),
+                 file.world_bounds())) {
       ++flat_;
       continue;
     }
+    const VoxelFrame frame = proxies_[number].frame();
+    const DAffine world_from_grid = compose(world_from_object, grid_placement(frame));
     Bounds box;
     for (int c = 0; c < 8; ++c)
       box.extend(transform_point(
           world_from_grid, DVec3((c & 1) * frame.size[0], (c >> 1 & 1) * frame.size[1], (c >> 2) * frame.size[2])));
     boxes.push_back(box);
-    placed_.push_back({i, number, grid_from_world, normal_matrix(world_from_grid)});
+    placed_.push_back({i, number, inverse(world_from_grid), normal_matrix(world_from_grid)});
   }
   tree_ = ThingTree(std::move(boxes));
+}
+
+template <class Begin, class Found>
+void VoxelScene::search(DVec3 origin, DVec3 direction, double t_min, double t_max, const Begin& begin,
+                        const Found& found) const {
+  tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
+    const Placed& placed = placed_[thing];
+    const Proxy& proxy = proxies_[placed.proxy];
+    const DVec3 o = transform_point(placed.grid_from_world, origin),
+                d = transform_vector(placed.grid_from_world, direction);
+    const double first = begin(proxy, o, d);
+    if (!(first < limit)) return limit;
+    const auto hit = hit_of(proxy, o, d, first, limit);
+    return hit ? found(thing, *hit, limit) : limit;
+  });
 }
 
 std::optional<SceneVoxelHit> VoxelScene::first_hit(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
   std::optional<ProxyHit> best;
   uint32_t best_thing = 0;
-  tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
-    const Placed& placed = placed_[thing];
-    const auto hit = hit_of(proxies_[placed.proxy], transform_point(placed.grid_from_world, origin),
-                            transform_vector(placed.grid_from_world, direction), t_min, limit);
-    if (!hit || (best && !(hit->t < best->t || (hit->t == best->t && thing < best_thing)))) return limit;
-    best = hit, best_thing = thing;
-    return hit->t > t_min ? std::nextafter(hit->t, limit + 1.0) : hit->t; // of equal ones the first instance counts
-  });
+  search(
+      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return t_min; },
+      [&](uint32_t thing, const ProxyHit& hit, double limit) {
+        if (best && !(hit.t < best->t || (hit.t == best->t && thing < best_thing))) return limit;
+        best = hit, best_thing = thing;
+        return hit.t > t_min ? std::nextafter(hit.t, limit + 1.0) : hit.t; // of equal ones the first instance counts
+      });
   if (!best) return std::nullopt;
   const Placed& from = placed_[best_thing];
   const Proxy& proxy = proxies_[from.proxy];
@@ -119,32 +139,26 @@ std::optional<FieldVisibility> VoxelScene::field_visibility(const SceneVoxelHit&
 
 bool VoxelScene::occluded(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
   bool hit = false;
-  tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
-    const Placed& placed = placed_[thing];
-    hit = hit_of(proxies_[placed.proxy], transform_point(placed.grid_from_world, origin),
-                 transform_vector(placed.grid_from_world, direction), t_min, limit)
-              .has_value();
-    return hit ? t_min : limit;
-  });
+  search(
+      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return t_min; },
+      [&](uint32_t, const ProxyHit&, double) {
+        hit = true;
+        return t_min;
+      });
   return hit;
 }
 
 double VoxelScene::first_distance(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
   constexpr double kDiagonal = 1.7320508075688772, kMargin = 1.0; // voxels
-  double nearest = t_max;
-  tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
-    const Placed& placed = placed_[thing];
-    const Proxy& proxy = proxies_[placed.proxy];
+  const auto begin = [&](const Proxy& proxy, DVec3 o, DVec3 d) {
     const VoxelIndex size = proxy.frame().size;
-    const DVec3 o = transform_point(placed.grid_from_world, origin),
-                d = transform_vector(placed.grid_from_world, direction);
     bool inside = true;
     for (int a = 0; a < 3; ++a) inside &= o[a] > -kMargin && o[a] < size[static_cast<size_t>(a)] + kMargin;
-    const double begin = inside ? std::max(t_min, kDiagonal / glm::length(d)) : t_min;
-    if (!(begin < limit)) return limit;
-    if (const auto hit = hit_of(proxy, o, d, begin, limit)) nearest = hit->t;
-    return nearest;
-  });
+    return inside ? std::max(t_min, kDiagonal / glm::length(d)) : t_min;
+  };
+  double nearest = t_max;
+  search(origin, direction, t_min, t_max, begin,
+         [&](uint32_t, const ProxyHit& hit, double) { return nearest = hit.t; });
   return nearest;
 }
 

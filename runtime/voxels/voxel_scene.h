@@ -28,6 +28,11 @@ struct FieldVisibility {
   float taps, cones;
 };
 
+/// Whether an instance's transform flattens it (see flattens()), or shrinks it to less than 2^-24 of the scene. Proxies
+/// do not stand for such instances.
+/// @param object, world bounds of the geometry and of the scene
+bool flattens(const DAffine& world_from_object, const Bounds& object, const Bounds& world);
+
 /// The instances of a file as voxels or distance fields, in the coordinates of the file (relative to
 /// BakedFile::origin()).
 class VoxelScene {
@@ -51,7 +56,7 @@ public:
   std::optional<FieldVisibility> field_visibility(const SceneVoxelHit& hit, DVec3 point, double radius) const;
 
   size_t instance_count() const { return placed_.size(); }
-  /// Instances with a proxy that a transform flattens to a plane, a line or a point; they are not traced.
+  /// Instances with a proxy that are flat (see flattens() above); they are not traced.
   uint64_t flat_instances() const { return flat_; }
   uint64_t instances_without_proxy() const { return without_; }
   /// Bytes of all streams and of what is needed to trace them.
@@ -64,6 +69,11 @@ private:
     DAffine grid_from_world;
     glm::dmat3 world_normal; ///< normals of the grid to the world, not of unit length
   };
+
+  /// The way of all rays: `begin(proxy, origin, direction)` returns the first t that counts, of a ray in the units of a
+  /// proxy's grid; `found(placed, hit, t_max)` returns the new t_max, and the search ends once it is not above t_min.
+  template <class Begin, class Found>
+  void search(DVec3 origin, DVec3 direction, double t_min, double t_max, const Begin& begin, const Found& found) const;
 
   std::vector<Proxy> proxies_;
   std::vector<Placed> placed_;

@@ -119,7 +119,7 @@ TEST(ShaderExport, OptionsWithoutEffectAreErrors) {
   refused({"export", bench.picture(), "-o", bench / "x.glsl", "--proxy-fill"}, "--proxy-fill");
   refused({"export", bench.picture(), "-o", bench / "x.glsl", "--texture", "0"}, "--texture");
   refused({"bake", bench.scene(), "-o", bench / "x.ptk", "--proxy-fill"}, "--proxy-fill");
-  for (const char* option : {"--no-jitter", "--fast-edges", "--ao-no-falloff"})
+  for (const char* option : {"--no-legend", "--fast-edges", "--ao-no-falloff"})
     refused({"render", bench.baked(), "-o", bench / "x.png", "--view", "voxels", option}, option);
   refused({"render", bench.baked(), "-o", bench / "x.png", "--view", "sdf", "--proxy-beyond", "8"}, "--proxy-beyond");
   const CommandResult without =

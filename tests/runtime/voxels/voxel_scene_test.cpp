@@ -2,6 +2,7 @@
 #include <limits>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include "compress/format/file/baked_file.h"
 #include "runtime/voxels/voxel_picture.h"
@@ -78,6 +79,42 @@ TEST(VoxelScene, TheFirstHitOfManyIsTheNearest) {
     }
   }
   EXPECT_GT(hits, 100u);
+}
+
+TEST(VoxelScene, InstancesThatScalesNearZeroFlattenAreNotTraced) {
+  Scene scene = balls(1); // with one of scale 0
+  for (const DVec3 scale : {DVec3(1, 1, 1e-30), DVec3(1e-8, 1, 1), DVec3(1e-30), DVec3(1e-5, 1, 1), DVec3(1e-3)})
+    scene.instances.push_back({0, Affine(test::scaling(scale))});
+  BakeConfig config;
+  config.proxy.use = ProxyUse::kVoxels;
+  config.proxy.voxels = 8;
+  const VoxelScene voxels(BakedFile::from_bytes(test::bake(scene, config).bytes));
+  EXPECT_EQ(voxels.flat_instances(), 4u);
+  EXPECT_EQ(voxels.instance_count(), 3u);
+}
+
+TEST(VoxelPicture, IsTheMeanOfItsViewsForAnyNumberOfThreads) {
+  const BakedFile file = baked_balls(1);
+  const VoxelScene scene(file);
+  const Camera camera = framing_camera(file.world_bounds(), {24, 18}, {});
+  const auto view = [&](uint32_t v) {
+    return PrimaryCamera(camera, {24, 18}, glm::dvec2(v % 2, v / 2) * 0.5 - 0.25); // NOLINT(bugprone-integer-division)
+  };
+  VoxelPictureConfig config;
+  config.views = 4, config.samples = 2;
+  Progress progress;
+  const VoxelPicture picture = trace_voxel_picture(scene, view, config, progress);
+  double hits = 0.0;
+  uint32_t edges = 0;
+  for (const float share : picture.coverage) {
+    EXPECT_EQ(4.0f * share, std::round(4.0f * share));
+    hits += 4.0 * static_cast<double>(share), edges += share > 0.0f && share < 1.0f;
+  }
+  EXPECT_GT(edges, 10u);
+  EXPECT_EQ(picture.rays, 24 * 18 * 4 + 2 * static_cast<uint64_t>(hits));
+  EXPECT_EQ(picture.field_pixels, 0u);
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(trace_voxel_picture(scene, view, config, progress).color, picture.color);
 }
 
 } // namespace
