@@ -28,12 +28,13 @@ public:
       drop_whole_tiles();
       choose_uv_grid();
     }
-    progress_.begin("assembling the file", 0);
+    progress_.begin("compressing images", 0);
     model_.scene_nodes().push_back(model_.add("nodes", GltfJson::object())); // the root, which GltfNodes fills
     materials_.add_all(uvs_.map());
     GltfMeshes meshes(file_, config_, materials_, uvs_, model_, result_.report);
     std::vector<bool> merged = merge_world(meshes);
     if (config_.codec == GltfCodec::kMeshopt) code_integers();
+    progress_.begin("assembling the file", 0);
     for (uint32_t g = 0; g < encoded_.size(); ++g) {
       if (config_.codec == GltfCodec::kDraco)
         for (const GltfPrimitive& primitive : encoded_[g].primitives)
@@ -86,6 +87,8 @@ private:
         for (const LatticePoint& p : plain.lattice) encoded_[g].box.extend(p);
         encoded_[g].primitives.push_back({std::move(plain), std::nullopt, std::nullopt});
       }
+      const GltfLatticeBox& box = encoded_[g].box;
+      if (config_.codec == GltfCodec::kMeshopt && !box.empty) encoded_[g].frame = position_frame(box.lo, box.hi);
       progress_.advance();
     });
   }
@@ -93,7 +96,7 @@ private:
   void compress() {
     DracoGrids grids;
     for (uint32_t g = 0; g < encoded_.size(); ++g) grids.add(file_.geometries()[g], g, encoded_[g].box);
-    progress_.begin("compressing", encoded_.size());
+    progress_.begin("compressing meshes", encoded_.size());
     tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(encoded_.size()), [&](uint32_t g) {
       const DracoGrid grid = grids.grid(file_.geometries()[g], g);
       for (GltfPrimitive& primitive : encoded_[g].primitives) {
@@ -171,8 +174,7 @@ private:
       const uint32_t g = instance.geometry;
       const bool alone = uses_[g] == 1 && (file_.geometries()[g].flags & baked::kWorldSpace) != 0;
       const bool has_levels = config_.levels && file_.lod(g).levels.size() > 1;
-      if (!alone || has_levels || encoded_[g].box.empty || !position_frame(encoded_[g].box.lo, encoded_[g].box.hi))
-        continue;
+      if (!alone || has_levels || !encoded_[g].frame) continue;
       merged[i] = true;
       placed.push_back({g, instance.first_slot, &encoded_[g]});
     }
@@ -182,10 +184,9 @@ private:
 
   /// Codes the primitives of geometries that are not merged, where their positions are stored as integers.
   void code_integers() {
-    progress_.begin("compressing", encoded_.size());
+    progress_.begin("compressing meshes", encoded_.size());
     tbb::parallel_for(size_t{0}, encoded_.size(), [&](size_t g) {
-      const GltfLatticeBox& box = encoded_[g].box;
-      const std::optional<PositionFrame> frame = box.empty ? std::nullopt : position_frame(box.lo, box.hi);
+      const std::optional<PositionFrame>& frame = encoded_[g].frame;
       for (GltfPrimitive& primitive : encoded_[g].primitives) {
         progress_.check_cancelled();
         if (!frame) continue;

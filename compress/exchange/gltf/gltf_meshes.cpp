@@ -141,7 +141,7 @@ GltfJson GltfMeshes::add_coded(const MeshoptPrimitive& coded, const PositionFram
 /// Adds a geometry whose positions are integers; those whose lattice is too fine stay floats.
 void GltfMeshes::add_meshopt(uint32_t geometry, GltfGeometry&& from) {
   const baked::GeometryRecord& record = file_.geometries()[geometry];
-  const std::optional<PositionFrame> frame = from.box.empty ? std::nullopt : position_frame(from.box.lo, from.box.hi);
+  const std::optional<PositionFrame>& frame = from.frame;
   for (GltfPrimitive& primitive : from.primitives) {
     if (!frame) {
       ++report_.plain_primitives;
@@ -259,28 +259,27 @@ void GltfMeshes::add_world(std::vector<Placed>&& geometries, Progress& progress)
   std::vector<Batch*> all;
   for (auto& [key, list] : batches)
     for (Batch& batch : list) all.push_back(&batch);
-  progress.begin("compressing", all.size());
+  progress.begin("compressing merged meshes", all.size());
   tbb::parallel_for(size_t{0}, all.size(), [&](size_t i) {
     progress.check_cancelled();
     Batch& batch = *all[i];
-    batch.coded = meshopt_primitive(batch.plain, *position_frame(batch.box.lo, batch.box.hi),
-                                    config_.meshopt_normal_bits, uvs_, true);
+    batch.frame = *position_frame(batch.box.lo, batch.box.hi);
+    batch.coded = meshopt_primitive(batch.plain, batch.frame, config_.meshopt_normal_bits, uvs_, true);
     batch.plain = {};
     progress.advance();
   });
   for (const auto& [key, list] : batches)
-    for (const Batch& batch : list)
-      add_batch(batch, *position_frame(batch.box.lo, batch.box.hi), key.step, key.material);
+    for (const Batch& batch : list) add_batch(batch, key.step, key.material);
 }
 
-void GltfMeshes::add_batch(const Batch& batch, const PositionFrame& frame, double step, int material) {
-  GltfJson primitive = add_coded(batch.coded, frame);
+void GltfMeshes::add_batch(const Batch& batch, double step, int material) {
+  GltfJson primitive = add_coded(batch.coded, batch.frame);
   if (primitive.is_null()) return;
   primitive["material"] = material;
   GltfJson node{{"mesh", model_.add("meshes", {{"primitives", GltfJson::array({std::move(primitive)})}})},
                 {"scale", {step, step, step}}};
-  if (frame.origin != LatticePoint{})
-    for (const int64_t q : frame.origin) node["translation"].push_back(static_cast<double>(q) * step);
+  if (batch.frame.origin != LatticePoint{})
+    for (const int64_t q : batch.frame.origin) node["translation"].push_back(static_cast<double>(q) * step);
   world_nodes_.push_back(model_.add("nodes", std::move(node)));
 }
 

@@ -41,7 +41,8 @@ struct GltfPrimitive {
 struct GltfGeometry {
   std::vector<GltfPrimitive> primitives;
   GltfLatticeBox box;
-  bool with_uvs = true; ///< some instance has a material with an image
+  std::optional<PositionFrame> frame; ///< codec meshopt: of positions as integers; none: they are floats
+  bool with_uvs = true;               ///< some instance has a material with an image
 };
 
 /// Draco grids of all geometries. World-space geometries with equal steps lie on one lattice and share a grid, so that
@@ -96,13 +97,14 @@ private:
   struct Batch {
     PlainPrimitive plain;
     GltfLatticeBox box;
+    PositionFrame frame; ///< of the box
     MeshoptPrimitive coded;
   };
 
   Template add_plain(PlainPrimitive&& plain);
   Template add_draco(const GltfPrimitive& from);
   void add_meshopt(uint32_t geometry, GltfGeometry&& from);
-  void add_batch(const Batch& batch, const PositionFrame& frame, double step, int material);
+  void add_batch(const Batch& batch, double step, int material);
   GltfJson add_coded(const MeshoptPrimitive& coded, const PositionFrame& frame);
   int add_floats(std::span<const float> values, const char* type);
   int add_indices(const std::vector<Triangle>& triangles, size_t vertices);
