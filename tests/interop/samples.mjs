@@ -212,10 +212,11 @@ const kSamples = {
     KHR_materials_unlit: [{}, (info) => info.materials_by_kind.matte === 1],
     KHR_materials_emissive_strength: [{ emissiveStrength: 3 }, (info, obj, mtl) => info.area_lights > 0 && /^Ke /m.test(mtl)],
     KHR_materials_transmission: [{ transmissionFactor: 1 }, (info, obj, mtl) => info.materials_by_kind.glass === 1 && /^d /m.test(mtl)],
-    KHR_materials_specular: [{ specularFactor: 0.5 }, (info, obj, mtl) => info.materials_by_kind.disney === 1 && !/^(Ke|d) /m.test(mtl)],
-    KHR_materials_ior: [{ ior: 1.3 }, (info, obj, mtl) => info.materials_by_kind.disney === 1 && !/^(Ke|d) /m.test(mtl)],
+    // tests/pbrt_import/gltf_test.cpp compares the index of refraction that both give.
+    KHR_materials_specular: [{ specularFactor: 0.5 }, (info) => info.materials_by_kind.disney === 1],
+    KHR_materials_ior: [{ ior: 1.3 }, (info) => info.materials_by_kind.disney === 1],
   }).map(([extension, [values, expected]]) => [extension.replace("KHR_materials_", ""), [(s) => {
-    s.json.extensionsUsed = [extension];
+    s.json.extensionsUsed = s.json.extensionsRequired = [extension]; // one that is not known is an error
     s.json.materials = [{ emissiveFactor: extension.endsWith("strength") ? [1, 1, 1] : [0, 0, 0], extensions: { [extension]: values } }];
     s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 0 });
   }, 12, [], expected]])),
@@ -242,11 +243,22 @@ const kSamples = {
     s.json.materials = [{ name: "" }, { name: "" }];
     s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 1 });
   }, 12],
-  ...Object.fromEntries(["OPAQUE", "MASK", "BLEND"].map((alphaMode) => [`alpha_${alphaMode.toLowerCase()}`, [(s) => {
-    s.json.materials = [{ alphaMode, ...(alphaMode === "MASK" ? { alphaCutoff: 0.25 } : {}), pbrMetallicRoughness: { baseColorFactor: [1, 0.5, 0, 0.75] } }];
-    s.primitive({ attributes: { POSITION: s.positions() }, indices: s.indices(), material: 0 });
-  }, 12, [], (info, obj, mtl) => /^Kd 1 0\.5 0$/m.test(mtl)]])),
+  // Alpha 0.2 is a surface, one above or below the cutoff, or glass; a second box shows the first one's absence.
+  ...Object.fromEntries(Object.entries({
+    opaque: [{}, opaque],
+    mask: [{ alphaMode: "MASK", alphaCutoff: 0.15 }, opaque],
+    mask_absent: [{ alphaMode: "MASK", alphaCutoff: 0.25 }, (info, obj, mtl) => info.shapes_absent === 1 && !/^Kd 1 0\.5 0$/m.test(mtl)],
+    blend: [{ alphaMode: "BLEND" }, (info, obj, mtl) => info.materials_by_kind.glass === 1 && /^d /m.test(mtl)],
+  }).map(([name, [mode, expected]]) => [`alpha_${name}`, [(s) => {
+    s.json.materials = [{ ...mode, pbrMetallicRoughness: { baseColorFactor: [1, 0.5, 0, 0.2] } }, { pbrMetallicRoughness: { baseColorFactor: [0, 0, 1, 1] } }];
+    const attributes = { POSITION: s.positions() }, indices = s.indices();
+    s.json.meshes = [{ primitives: (name === "mask_absent" ? [0, 1] : [0]).map((material) => ({ attributes, indices, material })) }];
+  }, 12, [], expected]])),
 };
+
+function opaque(info, obj, mtl) {
+  return info.materials_by_kind.disney > 0 && info.shapes_absent === 0 && /^Kd 1 0\.5 0$/m.test(mtl) && !/^d /m.test(mtl);
+}
 
 /** The numbers of the lines of an OBJ file with a keyword. */
 const rows = (text, keyword) => [...text.matchAll(new RegExp(`^${keyword} (.*)$`, "gm"))].map((line) => line[1].split(" ").map(Number));
