@@ -108,14 +108,6 @@ constexpr std::string_view kPrefix = ".packtrace-", kSuffix = ".tmp";
 
 fs::path folder_of(const fs::path& target) { return target.has_parent_path() ? target.parent_path() : fs::path("."); }
 
-/// A new name for a temporary file, different in each call.
-fs::path temporary_name(const fs::path& folder) {
-  static std::atomic<uint64_t> number{0};
-  std::string name(kPrefix);
-  name.append(std::to_string(getpid())).append("-").append(std::to_string(++number)).append(kSuffix);
-  return folder / name;
-}
-
 /// Process id of the owner of a temporary file; nullopt if the name is not that of a temporary file.
 std::optional<pid_t> owner_of(std::string_view name) {
   if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return std::nullopt;
@@ -139,7 +131,7 @@ Descriptor create_nameless(const fs::path& folder) {
 /// Creates an empty file with a unique name, locked so that remove_stale_output() knows that it is in use.
 Descriptor create_named(const fs::path& folder, const fs::path& target, fs::path& name) {
   for (int attempt = 0; attempt < kMaxNameAttempts; ++attempt) {
-    name = temporary_name(folder);
+    name = new_temporary_name(folder);
     Descriptor file(open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (!file.valid()) {
       if (errno != EEXIST) fail(target, std::string("cannot write there: ") + std::strerror(errno));
@@ -169,6 +161,13 @@ int rename_if_free(const fs::path& from, const fs::path& to) {
 }
 
 } // namespace
+
+fs::path new_temporary_name(const fs::path& folder) {
+  static std::atomic<uint64_t> number{0};
+  std::string name(kPrefix);
+  name.append(std::to_string(getpid())).append("-").append(std::to_string(++number)).append(kSuffix);
+  return folder / name;
+}
 
 OutputFile::OutputFile(fs::path target, bool force) : target_(std::move(target)), force_(force) {
   if (target_.empty()) throw Error(ErrorKind::kUsage, "the output file has an empty name");
@@ -220,7 +219,7 @@ void OutputFile::append(std::span<const std::byte> bytes) {
 void OutputFile::give_name() {
   const fs::path folder = folder_of(target_);
   for (int attempt = 0; attempt < kMaxNameAttempts; ++attempt) {
-    temporary_ = temporary_name(folder);
+    temporary_ = new_temporary_name(folder);
     remember(temporary_.c_str());
     flock(descriptor_.get(), LOCK_EX);
     if (linkat(AT_FDCWD, path_.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW) == 0) return;

@@ -61,6 +61,9 @@ private:
 void refuse_to_replace(const std::vector<std::filesystem::path>& inputs, const std::filesystem::path& target);
 void refuse_to_replace(const std::vector<std::filesystem::path>& inputs);
 
+/// A new name for a temporary file in a folder. remove_stale_output() removes the file when the process has ended.
+std::filesystem::path new_temporary_name(const std::filesystem::path& folder);
+
 /// Removes the temporary files of all uncommitted OutputFiles of the process. Async-signal-safe.
 void remove_unfinished_output() noexcept;
 

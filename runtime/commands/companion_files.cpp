@@ -14,6 +14,7 @@ CompanionFiles::CompanionFiles(const fs::path& main, fs::path input, bool force)
 
 CompanionFiles::~CompanionFiles() {
   std::error_code ignored; // a folder that others have filled meanwhile stays
+  for (const std::unique_ptr<ReplacedFile>& file : replaced_) file->restore();
   for (const fs::path& path : created_ | std::views::reverse) fs::remove(path, ignored);
 }
 
@@ -36,11 +37,15 @@ void CompanionFiles::write(std::span<const ExportedFile> files, Progress& progre
     const bool existed = fs::exists(fs::symlink_status(path, error));
     OutputFile output(path, force_);
     output.write(file.bytes);
+    if (existed) replaced_.push_back(std::make_unique<ReplacedFile>(output.target()));
     output.commit();
     if (!existed) created_.push_back(path);
   }
 }
 
-void CompanionFiles::keep() { created_.clear(); }
+void CompanionFiles::keep() {
+  created_.clear();
+  replaced_.clear();
+}
 
 } // namespace packtrace

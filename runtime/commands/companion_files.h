@@ -1,18 +1,20 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "compress/exchange/scene/exported_file.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/base/replaced_file.h"
 
 namespace packtrace {
 
 /// The files beside the main file of an export. Unless keep() is called, the destructor removes those that were not
-/// there before, and their folder if it was not. Files that were replaced (force) stay replaced, and a second Ctrl-C
-/// ends the process without the destructor.
+/// there before, and their folder if it was not, and puts back those that were replaced (force). A second Ctrl-C ends
+/// the process without the destructor.
 class CompanionFiles {
 public:
   /// @param main the main file, whose folder the names are relative to
@@ -34,6 +36,7 @@ private:
   const std::filesystem::path folder_, input_;
   const bool force_;
   std::vector<std::filesystem::path> created_; ///< in the order in which they were made
+  std::vector<std::unique_ptr<ReplacedFile>> replaced_;
 };
 
 } // namespace packtrace

@@ -115,7 +115,11 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
     GltfExport result = export_gltf(file, config, progress);
     std::vector<ExportedFile> others;
     if (!config.buffer_name.empty()) others.push_back({config.buffer_name, std::move(result.buffer)});
-    return {std::move(result.bytes), std::move(others), to_json(names, result.report), to_text(names, result.report)};
+    std::vector<std::string> warnings;
+    if (config.levels && result.report.levels == 0)
+      warnings.emplace_back("--levels: no instance has levels of detail; bake --lod makes them");
+    return {std::move(result.bytes), std::move(others), to_json(names, result.report), to_text(names, result.report),
+            std::move(warnings)};
   }
   if (layout != kVertex16) {
     names.layout = layout;

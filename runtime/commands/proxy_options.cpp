@@ -20,7 +20,6 @@ void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
           "bit where the surface passes, in a tree that any voxel can be read from. sdf: distances to the surface "
           "near it (default off)")
       ->check(one_of({kNoProxy, kVoxelsName, kFieldName}))
-      ->default_str(kNoProxy)
       ->group(kGroup);
   verb.add_option("--proxy-voxels", options.voxels,
                   "Voxels along the longest side of a geometry's bounds, 1..4096 (default 64)")
@@ -47,7 +46,7 @@ void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
 
 std::vector<std::string> ProxyOptions::names() const {
   std::vector<std::string> names;
-  if (proxy != kNoProxy) names.push_back("--proxy");
+  if (proxy) names.push_back("--proxy");
   if (voxels) names.push_back("--proxy-voxels");
   if (rule) names.push_back("--proxy-surface");
   if (field_bits) names.push_back("--proxy-bits");
@@ -59,9 +58,10 @@ std::vector<std::string> ProxyOptions::names() const {
 
 ProxyConfig make_proxy_config(const ProxyOptions& options) {
   ProxyConfig config;
-  if (options.proxy == kNoProxy) {
-    if (const std::vector<std::string> names = options.names(); !names.empty())
-      throw Error(ErrorKind::kUsage, names.front() + " requires --proxy voxels or sdf");
+  if (options.proxy.value_or(kNoProxy) == kNoProxy) {
+    std::vector<std::string> names = options.names();
+    std::erase(names, "--proxy");
+    if (!names.empty()) throw Error(ErrorKind::kUsage, names.front() + " requires --proxy voxels or sdf");
     return config;
   }
   config.use = options.proxy == kFieldName ? ProxyUse::kField : ProxyUse::kVoxels;

@@ -12,7 +12,7 @@ namespace packtrace {
 
 /// The proxy options of `bake`.
 struct ProxyOptions {
-  std::string proxy = "off";
+  std::optional<std::string> proxy; ///< off unless set
   std::optional<uint32_t> voxels;
   std::optional<std::string> rule;
   std::optional<uint32_t> field_bits;

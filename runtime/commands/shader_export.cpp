@@ -47,6 +47,7 @@ public:
     if (const std::span<const uint8_t> bytes = proxy_bytes(file); !bytes.empty()) stored_ = read_proxies(bytes);
     geometry_ = find_geometry(file, input, options.geometry, stored_);
     ProxyOptions proxy = options.proxy;
+    if (proxy.proxy == "off") throw Error(ErrorKind::kUsage, "--proxy off has no effect on shaders, which hold voxels");
     if (proxy.proxy == "sdf") throw Error(ErrorKind::kUsage, "shaders hold voxels: use --proxy voxels");
     proxy.proxy = "voxels";
     config_ = make_proxy_config(proxy);

@@ -140,6 +140,22 @@ TEST(ExportedFiles, NothingRemainsOfAFailedExport) {
   const Words with_folder = bench.names();
   EXPECT_EQ(limited("x.pbrt").exit_code, 6);
   EXPECT_EQ(bench.names(), with_folder);
+
+  const std::string mesh = bench / "x_files/mesh_1_0.ply"; // and so does what would be replaced
+  write_text(mesh, "mine");
+  write_text(bench / "x.pbrt", "mine");
+  const Words with_mesh = bench.names();
+  EXPECT_EQ(limited("x.pbrt", {"--force"}).exit_code, 6);
+  EXPECT_EQ(bench.names(), with_mesh);
+  EXPECT_EQ(read_text(mesh), "mine");
+  EXPECT_EQ(read_text(bench / "x.pbrt"), "mine");
+}
+
+TEST(ExportedFiles, LevelsThatAreMissingAreReported) {
+  const ExportBench bench;
+  const CommandResult result = run_packtrace({"export", bench.baked(), "-o", bench / "x.glb", "--levels"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.err.find("warning: --levels: no instance has levels of detail"), std::string::npos) << result.err;
 }
 
 TEST(ExportedFiles, ReplaceNeitherTheInputNorTheReport) {

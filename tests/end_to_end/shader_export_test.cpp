@@ -111,11 +111,13 @@ TEST(ShaderExport, OptionsWithoutEffectAreErrors) {
                                       {"--texture", "0"},
                                       {"--image-size", "9"},
                                       {"--image-format", "bit"},
+                                      {"--proxy", "off"},
                                       {"--proxy-bits", "16"},
                                       {"--proxy-voxels", "9"},
                                       {"--proxy-surface", "thin"}})
     refused({"export", bench.baked(), "-o", bench / "x.glb", option, value}, option);
   refused({"export", bench.baked(), "-o", bench / "x.glsl", "--image-size", "9"}, "--image-size");
+  refused({"export", bench.baked(), "-o", bench / "x.glsl", "--proxy", "off"}, "--proxy off");
   refused({"export", bench.picture(), "-o", bench / "x.glsl", "--proxy-fill"}, "--proxy-fill");
   refused({"export", bench.picture(), "-o", bench / "x.glsl", "--texture", "0"}, "--texture");
   refused({"bake", bench.scene(), "-o", bench / "x.ptk", "--proxy-fill"}, "--proxy-fill");
