@@ -18,6 +18,19 @@ float clamped(double value) { return static_cast<float>(std::clamp(value, 0.0, 1
 
 std::string_view wrap_name(uint64_t mode) { return mode == 33071 ? "clamp" : "repeat"; }
 
+/// Index of refraction with the reflectance of the material's when looked at straight: KHR_materials_specular scales
+/// what KHR_materials_ior gives.
+float index_of(const Value& material) {
+  constexpr double kDefault = 1.5;
+  const std::optional<Value> ior = material.extension("KHR_materials_ior");
+  const double index = std::max(ior ? ior->number_or("ior", kDefault) : kDefault, 1.0);
+  const std::optional<Value> specular = material.extension("KHR_materials_specular");
+  if (!specular) return static_cast<float>(index);
+  const double factor = std::clamp(specular->number_or("specularFactor", 1.0), 0.0, 1.0);
+  const double root = std::sqrt(factor) * (index - 1.0) / (index + 1.0);
+  return static_cast<float>((1.0 + root) / (1.0 - root));
+}
+
 } // namespace
 
 Materials::Materials(Document& document, FileNames& file_names) : document_(document), file_names_(file_names) {
@@ -180,7 +193,10 @@ void Materials::define(const Value& material, MaterialUse& use) {
   use.emission = to_vec3(material.numbers_or("emissiveFactor", {0.0, 0.0, 0.0})) *
                  static_cast<float>(strength ? strength->number_or("emissiveStrength", 1.0) : 1.0);
   if (glm::any(glm::lessThan(use.emission, Vec3(0.0f)))) material.fail("emits negative light");
-  const std::optional<Value> ior = material.extension("KHR_materials_ior");
+  if (const std::optional<Value> specular = material.extension("KHR_materials_specular"))
+    if (specular->has("specularTexture") || specular->has("specularColorTexture") ||
+        specular->has("specularColorFactor"))
+      warn("KHR_materials_specular is reduced to its factor; its colour and textures are left out");
 
   Vec3 means(1.0f); // of roughness in y, of metalness in z
   if (const std::optional<Value> texture = base.find("metallicRoughnessTexture")) {
@@ -198,7 +214,7 @@ void Materials::define(const Value& material, MaterialUse& use) {
     feed.colour(parameter, colour);
   else
     feed.texture(parameter, texture);
-  if (kind == "glass") feed.number("eta", static_cast<float>(std::max(ior ? ior->number_or("ior", 1.5) : 1.5, 1.0)));
+  if (kind != "matte") feed.number("eta", index_of(material));
   if (kind == "disney") {
     feed.number("metallic", clamped(base.number_or("metallicFactor", 1.0) * double{means.z}));
     feed.number("roughness", clamped(base.number_or("roughnessFactor", 1.0) * double{means.y}));
