@@ -123,6 +123,7 @@ ImportResult import_mesh_files(std::span<const std::filesystem::path> files, con
   result.files.insert(result.files.end(), named.begin(), named.end());
   result.statistics.files_read += read.files_read;
   result.statistics.bytes_read += read.bytes_read;
+  result.statistics.deforming_s = read.deforming_s;
   return result;
 }
 

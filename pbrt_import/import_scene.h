@@ -36,6 +36,9 @@ struct ImportOptions {
   std::optional<uint32_t> world;
   std::optional<double> time; ///< time at which animations are evaluated; unset: shutter opening of the camera
   double mesh_scale = 1.0;    ///< factor of the coordinates of mesh files, within [1e-30, 1e30]
+  /// Time of morph targets and skins of glTF files, whose animation repeats; unset: as `time`, without repetition.
+  std::optional<double> pose_time;
+  std::optional<std::string> animation; ///< of glTF files: name or number of the one that moves nodes; unset: the first
   bool allow_uris_outside_folder = false; ///< glTF files may name files outside their folder
   UpAxis mesh_up = UpAxis::kY;            ///< up axis of mesh files; scenes have y
 };
@@ -58,6 +61,7 @@ struct ImportStatistics {
   uint64_t animated_shapes = 0;              ///< shapes in the scene, counted once per object
   uint64_t animated_instances = 0;
   uint64_t animated_cameras = 0;
+  double deforming_s = 0.0;                ///< duration of the animation that deforms meshes of glTF files; 0: none
   uint64_t cameras_left_out = 0;           ///< cameras left out because of an error in them or in their transform
   std::array<uint64_t, 3> problems{};      ///< problems reported, by Severity
   std::map<std::string, uint64_t> ignored; ///< occurrences of unsupported features; names in docs/json_output.md
@@ -76,7 +80,7 @@ struct ImportResult {
 ///
 /// If there are several worlds, one is read together with the options before it, as if it were alone. The text of the
 /// others is checked, but of the files that they name only included ones are opened. Everything animated is placed at
-/// Scene::time; the animation keys are in Scene::animations.
+/// Scene::time; the animation keys are in Scene::animations, glTF files fill Scene::motion.
 ///
 /// Scene::cameras[0] is the last camera of the file, which pbrt renders with; the others follow in file order. Objects
 /// without instances are left out, and so are materials, masks, textures and meshes without users.

@@ -128,6 +128,10 @@ void SceneBuilder::count_kept(const Directive& directive) {
     return;
   }
   for (uint32_t i = 0; i < directive.name_count; ++i) bytes += directive.names[i].size();
+  count_kept(bytes);
+}
+
+void SceneBuilder::count_kept(uint64_t bytes) {
   kept_bytes_ += bytes;
   constexpr uint64_t kStep = 1u << 20;
   if (kept_bytes_ > kept_memory_.bytes() + kStep) kept_memory_.resize(kept_bytes_, "what the scene's text describes");

@@ -9,6 +9,7 @@
 
 #include "pbrt_import/builder/file_loader.h"
 #include "pbrt_import/builder/mesh_queue.h"
+#include "pbrt_import/builder/tracked_motions.h"
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/language/cameras.h"
 #include "pbrt_import/language/file_names.h"
@@ -30,6 +31,9 @@ public:
 
   /// Executes a directive. May move large arrays out of its parameters.
   void handle(Directive& directive);
+
+  /// Adds a track for TrackedMotion; returns its number. Throws MemoryError.
+  uint32_t add_track(MotionTrack track);
 
   /// Reads the files that the scene needs and returns the scene. Call once, after the last directive.
   /// @param end position of the end of the text
@@ -82,6 +86,7 @@ private:
   bool make_inline_mesh(Directive& directive, Shape& shape);
   bool make_or_queue(MeshQueue::Entry&& entry);
   void count_kept(const Directive& directive);
+  void count_kept(uint64_t bytes);
   bool skip_shape(std::string_view kind, const Place& place, const std::string& problem);
   bool report_mesh(MeshQueue::Entry& entry);
   void take_queued_meshes();
@@ -127,6 +132,7 @@ private:
   MemoryReservation kept_memory_;           ///< for all other data kept of directives, reserved in steps
   uint64_t kept_bytes_ = 0;
   LargeHeapPages heap_pages_;
+  TrackedMotions tracked_;
   MeshQueue mesh_queue_; ///< last member, so that its tasks end before other members are destroyed
 };
 

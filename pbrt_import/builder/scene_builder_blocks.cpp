@@ -124,9 +124,16 @@ void SceneBuilder::add_instance(const Directive& directive) {
   reserve_one_more(scene_.instances);
   if (placement.animation != kNotAnimated)
     scene_.animated_instances.push_back({static_cast<uint32_t>(scene_.instances.size()), placement.animation});
+  if (directive.motion.track != kNoTrack)
+    tracked_.add_instance(static_cast<uint32_t>(scene_.instances.size()), directive.motion);
   scene_.instances.push_back({objects_by_name_[*found], world_from_object});
   reserve_one_more(instance_residuals_);
   instance_residuals_.emplace_back(placement.map - DAffine(world_from_object));
+}
+
+uint32_t SceneBuilder::add_track(MotionTrack track) {
+  count_kept(track.keys.capacity() * sizeof(MotionKey));
+  return tracked_.add_track(std::move(track));
 }
 
 SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::string_view thing) {

@@ -219,8 +219,8 @@ void SceneBuilder::count_features() {
   };
   statistics_.animated_shapes = count(scene_.shapes);
   for (const Object& object : scene_.objects) statistics_.animated_shapes += count(object.shapes);
-  statistics_.animated_instances = scene_.animated_instances.size();
-  statistics_.animated_cameras = count(scene_.cameras);
+  statistics_.animated_instances = scene_.animated_instances.size() + scene_.motion.instances.size();
+  statistics_.animated_cameras = count(scene_.cameras) + scene_.motion.cameras.size();
   const auto bumps = std::count_if(scene_.materials.begin(), scene_.materials.end(),
                                    [](const Material& material) { return (material.flags & kNormalMap) != 0; });
   if (bumps > 0) statistics_.ignored["bump_maps"] = static_cast<uint64_t>(bumps);
@@ -230,11 +230,11 @@ void SceneBuilder::report_and_drop_unused_objects() {
   uint64_t count = 0;
   uint32_t first = 0;
   std::string name; // copied before the objects are renumbered
-  drop_unused_objects(scene_, instance_residuals_, false, [&](uint32_t object) {
+  tracked_.renumber(drop_unused_objects(scene_, instance_residuals_, false, [&](uint32_t object) {
     if (count++ > 0) return;
     first = object;
     name = in_quotes(scene_.objects[object].name);
-  });
+  }));
   if (count == 0) return;
   reporter_.warning(object_places_[first],
                     "object " + name + (count == 1 ? " is" : " and " + std::to_string(count - 1) + " more are") +
@@ -276,7 +276,8 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   }
   scene_.cameras = cameras_.finish();
   statistics_.cameras_left_out = cameras_.left_out();
-  drop_unused_objects(scene_, instance_residuals_, options_.keep_unused_objects, [](uint32_t) {});
+  tracked_.renumber(drop_unused_objects(scene_, instance_residuals_, options_.keep_unused_objects, [](uint32_t) {}));
+  scene_.motion = tracked_.take(scene_.shapes.size(), cameras_.tracks());
   move_far_world(scene_, instance_residuals_);
   instance_residuals_ = {};
   drop_unused_parts(scene_);

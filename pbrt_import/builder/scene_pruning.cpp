@@ -10,7 +10,7 @@ namespace {
 /// Keeps the used elements in order, drops the others and returns the new index of each element.
 template <class Element>
 std::vector<uint32_t> keep_used(std::vector<Element>& elements, const std::vector<uint8_t>& used) {
-  std::vector<uint32_t> numbers(elements.size(), 0);
+  std::vector<uint32_t> numbers(elements.size(), kDropped);
   uint32_t count = 0;
   for (size_t i = 0; i < elements.size(); ++i) {
     if (!used[i]) continue;
@@ -42,8 +42,8 @@ void drop_unused_animations(Scene& scene) {
 
 } // namespace
 
-void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
-                         const std::function<void(uint32_t object)>& unused) {
+std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
+                                          const std::function<void(uint32_t object)>& unused) {
   std::vector<uint8_t> shown(scene.objects.size(), keep_unplaced ? 1 : 0);
   for (const Instance& instance : scene.instances) shown[instance.object] = 1;
   for (uint32_t i = 0; i < scene.objects.size(); ++i) {
@@ -58,6 +58,7 @@ void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep
   for (AnimatedInstance& animated : scene.animated_instances) animated.instance = instance_numbers[animated.instance];
   const std::vector<uint32_t> numbers = keep_used(scene.objects, shown);
   for (Instance& instance : scene.instances) instance.object = numbers[instance.object];
+  return instance_numbers;
 }
 
 void drop_unused_parts(Scene& scene) {

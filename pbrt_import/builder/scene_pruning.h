@@ -15,12 +15,16 @@ void for_each_shape(Scene& scene, Function function) {
     for (Shape& shape : object.shapes) function(shape);
 }
 
+/// New number of what was dropped.
+inline constexpr uint32_t kDropped = ~0u;
+
 /// Drops objects without instances, and objects without shapes together with their instances. The rest keeps its order.
 /// @param residuals by instance: rounding error of its transform, as in move_far_world(); updated with the instances
 /// @param keep_unplaced keep objects that have shapes but no instance
+/// @return by old number of an instance: its new one, or kDropped
 /// @param unused called with the index of each object that has shapes but no instance
-void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
-                         const std::function<void(uint32_t object)>& unused);
+std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
+                                          const std::function<void(uint32_t object)>& unused);
 
 /// Drops meshes and materials that no shape uses, then masks and textures that no material uses, then unused
 /// animations.

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <ranges>
-
-#include <glm/gtc/quaternion.hpp>
+#include <utility>
 
 #include "pbrt_import/gltf/gltf_accessors.h"
 #include "pbrt_import/text/problem_text.h"
@@ -17,88 +15,11 @@ namespace {
 
 DVec3 to_dvec3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
-/// What an animation sets of a node.
-struct AnimatedValues {
-  std::optional<std::vector<double>> translation, rotation, scale, weights;
-};
-
-/// Values of a sampler at a time. Source: glTF 2.0 specification, appendix C.
-std::vector<double> evaluate(const std::vector<float>& times, const std::vector<float>& values, size_t components,
-                             const std::string& interpolation, double time, bool rotates) {
-  const bool cubic = interpolation == "CUBICSPLINE";
-  const size_t stride = components * (cubic ? 3 : 1), shift = cubic ? components : 0;
-  const auto value = [&](size_t key, size_t i) { return double{values[key * stride + shift + i]}; };
-  std::vector<double> result(components);
-  const auto after = std::ranges::upper_bound(times, time, {}, [](float t) { return double{t}; });
-  const auto next = static_cast<size_t>(after - times.begin());
-  if (next == 0 || next == times.size() || interpolation == "STEP") {
-    for (size_t i = 0; i < components; ++i) result[i] = value(next == 0 ? 0 : next - 1, i);
-    return result;
-  }
-  const size_t key = next - 1;
-  const double span = double{times[next]} - double{times[key]}, t = (time - double{times[key]}) / span;
-  if (!cubic && rotates) { // rotations are interpolated on the sphere
-    const auto quaternion = [&](size_t k) { return glm::dquat(value(k, 3), value(k, 0), value(k, 1), value(k, 2)); };
-    const glm::dquat q = glm::slerp(quaternion(key), quaternion(next), t);
-    return {q.x, q.y, q.z, q.w};
-  }
-  for (size_t i = 0; i < components; ++i) {
-    if (!cubic) {
-      result[i] = value(key, i) + (value(next, i) - value(key, i)) * t;
-      continue;
-    }
-    const double out = span * double{values[key * stride + 2 * components + i]},
-                 in = span * double{values[next * stride + i]};
-    const double t2 = t * t, t3 = t2 * t;
-    result[i] = (2 * t3 - 3 * t2 + 1) * value(key, i) + (t3 - 2 * t2 + t) * out + (3 * t2 - 2 * t3) * value(next, i) +
-                (t3 - t2) * in;
-  }
-  return result;
-}
-
-void read_channel(Document& document, const Value& animation, const Value& channel, double time,
-                  std::map<uint64_t, AnimatedValues>& animated) {
-  const Value target = channel.at("target");
-  const std::optional<uint64_t> node = target.find_integer("node");
-  const std::string path = target.at("path").text();
-  if (!node) return;
-  const bool rotates = path == "rotation";
-  const bool morphs = path == "weights";
-  if (!rotates && !morphs && path != "translation" && path != "scale") target.fail("has an unknown path");
-  const Value sampler = animation.at("samplers")[static_cast<size_t>(channel.at("sampler").integer())];
-  const std::string interpolation = sampler.text_or("interpolation", "LINEAR");
-  if (interpolation != "LINEAR" && interpolation != "STEP" && interpolation != "CUBICSPLINE")
-    sampler.fail("has an unknown interpolation");
-  const ValuesInUse in_use(document);
-  const AccessorValues times = read_floats(document, sampler.at("input").integer());
-  const AccessorValues values = read_floats(document, sampler.at("output").integer());
-  const uint64_t keys = times.count * (interpolation == "CUBICSPLINE" ? 3 : 1);
-  const bool fits = times.components == 1 && keys > 0 &&
-                    (morphs ? values.components == 1 && values.count % keys == 0 && values.count > 0
-                            : values.components == (rotates ? 4u : 3u) && values.count == keys);
-  if (!fits) sampler.fail("has times and values that do not fit each other");
-  for (size_t i = 1; i < times.values.size(); ++i)
-    if (!(times.values[i] > times.values[i - 1])) sampler.fail("has times that do not increase");
-  const size_t components = values.values.size() / static_cast<size_t>(keys); // of morphing: its targets
-  std::vector<double> value = evaluate(times.values, values.values, components, interpolation, time, rotates);
-  if (!std::ranges::all_of(value, [](double v) { return std::isfinite(v); }))
-    sampler.fail("has values that are not finite");
-  AnimatedValues& set = animated[*node];
-  (rotates ? set.rotation : morphs ? set.weights : path == "scale" ? set.scale : set.translation) = std::move(value);
-}
-
-/// Values that the document's first animation gives nodes at a time; further animations are alternatives to it.
-std::map<uint64_t, AnimatedValues> animate(Document& document, double time) {
-  std::map<uint64_t, AnimatedValues> animated;
-  Reporter& reporter = document.context().feed.reporter();
-  if (document.count("animations") == 0) return animated;
-  if (document.count("animations") > 1) reporter.note(document.place(), "of several animations the first is used");
-  const std::string problem = problem_of([&] {
-    const Value animation = document.element("animations", 0), channels = animation.at("channels");
-    for (size_t i = 0; i < channels.size(); ++i) read_channel(document, animation, channels[i], time, animated);
-  });
-  if (!problem.empty()) reporter.error(document.place(), problem + "; the animation ends there");
-  return animated;
+/// The rotation of a quaternion x, y, z, w of any length; none if it has no length.
+glm::dquat unit_rotation(double x, double y, double z, double w) {
+  const glm::dquat q(w, x, y, z);
+  const double length = glm::length(q);
+  return length > 0.0 && std::isfinite(length) ? q / length : glm::dquat(1.0, 0.0, 0.0, 0.0);
 }
 
 DAffine local_map(const Value& node, const AnimatedValues& animated) {
@@ -107,9 +28,7 @@ DAffine local_map(const Value& node, const AnimatedValues& animated) {
     if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] != 1.0) matrix->fail("is not affine");
     return DAffine(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10], m[12], m[13], m[14]);
   }
-  return compose_trs(to_dvec3(animated.translation.value_or(node.numbers_or("translation", {0.0, 0.0, 0.0}))),
-                     animated.rotation.value_or(node.numbers_or("rotation", {0.0, 0.0, 0.0, 1.0})),
-                     to_dvec3(animated.scale.value_or(node.numbers_or("scale", {1.0, 1.0, 1.0}))));
+  return compose_trs(local_parts(node, animated));
 }
 
 /// The roots of the document's scene; without scenes, all nodes that are nobody's child.
@@ -137,38 +56,51 @@ std::vector<uint64_t> scene_roots(Document& document) {
 
 } // namespace
 
-DAffine compose_trs(DVec3 translation, const std::vector<double>& rotation, DVec3 scale) {
-  glm::dquat q(rotation[3], rotation[0], rotation[1], rotation[2]);
-  const double length = glm::length(q);
-  q = length > 0.0 && std::isfinite(length) ? q / length : glm::dquat(1.0, 0.0, 0.0, 0.0);
-  const glm::dmat3 turn = glm::mat3_cast(q);
-  return DAffine(turn[0] * scale.x, turn[1] * scale.y, turn[2] * scale.z, translation);
+Trs local_parts(const Value& node, const AnimatedValues& animated) {
+  const std::vector<double> r = animated.rotation.value_or(node.numbers_or("rotation", {0.0, 0.0, 0.0, 1.0}));
+  return {to_dvec3(animated.translation.value_or(node.numbers_or("translation", {0.0, 0.0, 0.0}))),
+          unit_rotation(r[0], r[1], r[2], r[3]),
+          to_dvec3(animated.scale.value_or(node.numbers_or("scale", {1.0, 1.0, 1.0})))};
 }
 
-std::vector<PlacedNode> place_nodes(Document& document, double time) {
+DAffine compose_trs(const Trs& parts) {
+  const glm::dmat3 turn = glm::mat3_cast(parts.rotation);
+  return DAffine(turn[0] * parts.scale.x, turn[1] * parts.scale.y, turn[2] * parts.scale.z, parts.translation);
+}
+
+std::vector<PlacedNode> place_nodes(Document& document, const Animation& animation, double time) {
   Reporter& reporter = document.context().feed.reporter();
-  const std::map<uint64_t, AnimatedValues> animated = animate(document, time);
   const size_t count = document.count("nodes");
+  document.memory().resize(document.memory().bytes() + count * sizeof(PlacedNode), "nodes of the glTF document");
   std::vector<bool> visited(count, false);
-  std::vector<PlacedNode> open, placed;
-  std::vector<uint64_t> roots = scene_roots(document);
-  for (const uint64_t root : roots | std::views::reverse) open.push_back({root, DAffine(1.0), {}});
+  std::vector<std::pair<uint64_t, size_t>> open; // with the parent's place
+  std::vector<PlacedNode> placed;
+  placed.reserve(count);
+  const std::vector<uint64_t> roots = scene_roots(document);
+  for (const uint64_t root : roots | std::views::reverse) open.emplace_back(root, kNoNode);
   while (!open.empty()) {
-    PlacedNode next = open.back();
+    const auto [number, parent] = open.back();
     open.pop_back();
     const std::string problem = problem_of([&] {
-      const Value node = document.element("nodes", next.node);
-      if (visited[static_cast<size_t>(next.node)]) node.fail("has several parents");
-      visited[static_cast<size_t>(next.node)] = true;
-      const auto found = animated.find(next.node);
-      const AnimatedValues values = found == animated.end() ? AnimatedValues{} : found->second;
-      next.world_from_node = compose(next.world_from_node, local_map(node, values));
+      const Value node = document.element("nodes", number);
+      if (visited[static_cast<size_t>(number)]) node.fail("has several parents");
+      visited[static_cast<size_t>(number)] = true;
+      const AnimatedValues values = animation.at(number, time);
+      const DAffine local = local_map(node, values);
+      PlacedNode next{number, local, {}, parent, kNoNode, local};
+      if (parent != kNoNode) {
+        next.world_from_node = compose(placed[parent].world_from_node, local);
+        next.mover = placed[parent].mover;
+        next.mover_from_node = compose(placed[parent].mover_from_node, local);
+      }
+      if (animation.moves(number) && !node.has("matrix"))
+        next.mover = placed.size(), next.mover_from_node = DAffine(1.0);
       if (const std::optional<Value> weights = node.find("weights")) next.weights = weights->numbers(weights->size());
       if (values.weights) next.weights = *values.weights;
-      placed.push_back(next);
+      placed.push_back(std::move(next));
       const std::optional<Value> children = node.find("children");
       for (size_t i = children ? children->size() : 0; i-- > 0;)
-        open.push_back({(*children)[i].integer(), next.world_from_node, {}});
+        open.emplace_back((*children)[i].integer(), placed.size() - 1);
     });
     if (!problem.empty()) reporter.error(document.place(), problem + "; the node is left out");
   }
@@ -200,9 +132,11 @@ std::vector<DAffine> instances_of(Document& document, const Value& node) {
       const std::vector<float>& v = values[k].values;
       return v.empty() ? DVec3(fallback) : DVec3(v[3 * i], v[3 * i + 1], v[3 * i + 2]);
     };
-    std::vector<double> rotation{0.0, 0.0, 0.0, 1.0};
-    for (size_t c = 0; c < 4 && !values[1].values.empty(); ++c) rotation[c] = double{values[1].values[4 * i + c]};
-    maps.push_back(compose_trs(vector(0, 0.0), rotation, vector(2, 1.0)));
+    Trs parts{vector(0, 0.0), {1.0, 0.0, 0.0, 0.0}, vector(2, 1.0)};
+    if (const std::vector<float>& q = values[1].values; !q.empty())
+      parts.rotation =
+          unit_rotation(double{q[4 * i]}, double{q[4 * i + 1]}, double{q[4 * i + 2]}, double{q[4 * i + 3]});
+    maps.push_back(compose_trs(parts));
   }
   return maps;
 }

@@ -17,6 +17,15 @@ JointMaps Skins::joint_maps(uint64_t skin) {
   return maps;
 }
 
+bool Skins::moves(uint64_t number) {
+  const auto [found, inserted] = moving_.try_emplace(number, false);
+  if (!inserted) return found->second;
+  const Value joints = document_.element("skins", number).at("joints");
+  for (size_t i = 0; i < joints.size() && !found->second; ++i)
+    found->second = nodes_[places_[static_cast<size_t>(joints[i].integer())]].mover != kNoNode;
+  return found->second;
+}
+
 std::vector<DAffine> Skins::read(uint64_t number) const {
   const Value skin = document_.element("skins", number);
   const Value joints = skin.at("joints");

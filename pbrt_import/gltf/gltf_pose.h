@@ -31,6 +31,8 @@ public:
   /// Maps of a skin's joints; nodes with one skin share them. Throws Error(kInput) if the skin is malformed or has a
   /// joint outside the scene.
   JointMaps joint_maps(uint64_t skin);
+  /// Whether an animation moves any of a skin's joints; joint_maps() has succeeded for it.
+  bool moves(uint64_t skin);
 
 private:
   std::vector<DAffine> read(uint64_t skin) const;
@@ -39,6 +41,7 @@ private:
   std::span<const PlacedNode> nodes_;
   std::vector<size_t> places_; ///< in nodes_ by number of a node; nodes_.size(): outside the scene
   std::map<uint64_t, JointMaps> known_;
+  std::map<uint64_t, bool> moving_;
 };
 
 /// The joints that move a vertex: four at a time.

@@ -4,16 +4,33 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <ranges>
 
 #include "pbrt_import/gltf/gltf_primitive.h"
+#include "pbrt_import/language/transforms.h"
 #include "pbrt_import/text/problem_text.h"
 
 namespace packtrace::gltf {
-Reader::Reader(const std::filesystem::path& file, uint32_t file_number, const MeshFileContext& context)
-    : context_(context), document_(std::make_unique<Document>(file, file_number, context)),
-      nodes_(place_nodes(*document_, context.options.time.value_or(0.0))) {
+namespace {
+
+std::string object_name(const Value& mesh, uint64_t number) {
+  return mesh.text_or("name", "mesh") + "#" + std::to_string(number);
+}
+
+} // namespace
+
+Reader::Reader(const std::filesystem::path& file, uint32_t file_number, const MeshFileContext& context,
+               const DAffine& world_from_file)
+    : context_(context), world_from_file_(world_from_file),
+      document_(std::make_unique<Document>(file, file_number, context)), animation_(*document_),
+      pose_time_(context.options.pose_time ? animation_.repeated(*context.options.pose_time)
+                                           : context.options.time.value_or(0.0)),
+      nodes_(place_nodes(*document_, animation_, context.options.time.value_or(0.0))),
+      tracks_(*document_, animation_, nodes_, world_from_file_), is_object_(document_->count("meshes"), 0) {
+  if (context.options.pose_time) posed_ = place_nodes(*document_, animation_, pose_time_);
   collect_meshes();
+  if (deforms_)
+    context_.statistics.deforming_s =
+        std::max(context_.statistics.deforming_s, animation_.span().end_s - animation_.span().begin_s);
 }
 
 void Reader::report(const std::string& problem, std::string_view consequence) {
@@ -21,40 +38,62 @@ void Reader::report(const std::string& problem, std::string_view consequence) {
 }
 
 void Reader::collect_meshes() {
-  Skins skins(*document_, nodes_);
-  for (const PlacedNode& placed : nodes_) {
+  MemoryReservation& memory = document_->memory();
+  memory.resize(memory.bytes() + nodes_.size() * sizeof(MeshUse), "nodes of the glTF document");
+  uses_.reserve(nodes_.size());
+  Skins skins(*document_, posed());
+  for (size_t i = 0; i < nodes_.size(); ++i) {
     context_.progress.check_cancelled();
-    report(problem_of([&] {
-             const Value node = document_->element("nodes", placed.node);
-             const std::optional<uint64_t> mesh = node.find_integer("mesh");
-             if (!mesh) return;
-             document_->element("meshes", *mesh); // throws if there is none
-             Pose pose{placed.weights, {}};
-             if (const std::optional<uint64_t> skin = node.find_integer("skin")) {
-               pose.joints = skins.joint_maps(*skin);
-               uses_.push_back({*mesh, DAffine(1.0), std::move(pose)}); // the node's own map does not matter
-               return;
-             }
-             const std::vector<DAffine> maps = instances_of(*document_, node);
-             document_->memory().resize(document_->memory().bytes() + maps.size() * sizeof(MeshUse),
-                                        "instances of the glTF document");
-             for (const DAffine& map : maps) uses_.push_back({*mesh, compose(placed.world_from_node, map), pose});
-           }),
-           "the node is left out");
+    report(problem_of([&] { collect_mesh(i, skins); }), "the node is left out");
   }
+  std::vector<uint64_t> counts(is_object_.size(), 0);
+  for (const MeshUse& use : uses_)
+    if (use.pose.empty()) counts[static_cast<size_t>(use.mesh)] += use.motion ? 2 : use.node_from_mesh.size();
+  for (size_t i = 0; i < counts.size(); ++i) is_object_[i] = counts[i] > 1;
 }
 
-void Reader::add_cameras(const DAffine& world_from_file) {
-  for (const PlacedNode& placed : nodes_ | std::views::reverse)
+void Reader::collect_mesh(size_t placed, Skins& skins) {
+  const Value node = document_->element("nodes", nodes_[placed].node);
+  const std::optional<uint64_t> mesh = node.find_integer("mesh");
+  if (!mesh) return;
+  document_->element("meshes", *mesh); // throws if there is none
+  MeshUse use;
+  use.mesh = *mesh;
+  use.pose.weights = posed()[placed].weights;
+  deforms_ |= animation_.morphs(nodes_[placed].node);
+  if (const std::optional<uint64_t> skin = node.find_integer("skin")) {
+    use.pose.joints = skins.joint_maps(*skin);
+    deforms_ |= skins.moves(*skin);
+  } else {
+    use.placed = placed;
+    use.node_from_mesh = instances_of(*document_, node);
+    report(problem_of([&] { use.motion = tracks_.of(placed); }), "the node stands still");
+  }
+  uses_.push_back(std::move(use));
+}
+
+void Reader::report_motion() {
+  if (deforms_ && !context_.options.pose_time)
+    context_.feed.reporter().note(document_->place(), "morph targets and skins stand as at " + to_text(pose_time_) +
+                                                          " s; bake --sequence animation keeps their motion");
+  const TimeSpan span = animation_.span();
+  const uint64_t tracks = tracks_.count();
+  if (tracks > 0)
+    context_.feed.reporter().note(
+        document_->place(), "the animation makes " + std::to_string(tracks) + (tracks == 1 ? " track" : " tracks") +
+                                " from " + to_text(span.begin_s) + " to " + to_text(span.end_s) + " s, which repeat");
+}
+
+void Reader::add_cameras() {
+  for (size_t i = nodes_.size(); i-- > 0;)
     report(problem_of([&] {
-             const Value node = document_->element("nodes", placed.node);
-             if (const std::optional<uint64_t> camera = node.find_integer("camera"))
-               add_camera(placed, *camera, world_from_file);
+             const Value node = document_->element("nodes", nodes_[i].node);
+             if (const std::optional<uint64_t> camera = node.find_integer("camera")) add_camera(i, *camera);
            }),
            "the camera is left out");
 }
 
-void Reader::add_camera(const PlacedNode& placed, uint64_t number, const DAffine& world_from_file) {
+void Reader::add_camera(size_t placed, uint64_t number) {
   const Value camera = document_->element("cameras", number);
   const bool perspective = camera.at("type").text() == "perspective";
   if (!perspective && camera.at("type").text() != "orthographic") camera.fail("has an unknown type");
@@ -74,9 +113,12 @@ void Reader::add_camera(const PlacedNode& placed, uint64_t number, const DAffine
   feed.send();
   // glTF's cameras look along -z, pbrt's along +z.
   const DAffine flip(1, 0, 0, 0, 1, 0, 0, 0, -1, 0, 0, 0);
-  const DAffine world_from_camera = compose(compose(world_from_file, placed.world_from_node), flip);
+  const DAffine world_from_camera = compose(compose(world_from_file_, nodes_[placed].world_from_node), flip);
   if (!(std::abs(glm::determinant(glm::dmat3(world_from_camera))) > 0.0))
     camera.fail("is placed by a map without an inverse");
+  TrackedMotion motion;
+  report(problem_of([&] { motion.track = tracks_.track_with(placed, flip).value_or(kNoTrack); }),
+         "the camera stands still");
   feed.transform("Transform", document_->place(), inverse(world_from_camera));
   feed.begin("Camera", document_->place(), {perspective ? "perspective" : "orthographic"});
   if (perspective) { // pbrt's angle is that of the shorter side
@@ -87,43 +129,17 @@ void Reader::add_camera(const PlacedNode& placed, uint64_t number, const DAffine
                                          static_cast<float>(-up), static_cast<float>(up)};
     feed.floats(ParameterType::kFloat, "screenwindow", window);
   }
+  feed.moves(motion);
   feed.send();
   feed.transform("Transform", document_->place(), DAffine(1.0));
 }
 
 void Reader::add_world() {
-  DirectiveFeed& feed = context_.feed;
   const Materials materials(*document_, context_.file_names);
-  std::vector<uint32_t> counts(document_->count("meshes"), 0);
-  for (const MeshUse& use : uses_)
-    if (use.pose.empty()) ++counts[static_cast<size_t>(use.mesh)];
-  const auto object_name = [](uint64_t mesh, const Value& value) {
-    return value.text_or("name", "mesh") + "#" + std::to_string(mesh);
-  };
-  for (size_t i = 0; i < counts.size(); ++i) {
-    if (counts[i] < 2) continue;
-    context_.progress.check_cancelled();
-    report(problem_of([&] {
-             feed.with_attributes(document_->place(), [&] {
-               feed.transform("Transform", document_->place(), DAffine(1.0));
-               feed.begin("ObjectBegin", document_->place(), {object_name(i, document_->element("meshes", i))});
-               feed.send();
-               add_shapes(materials, i, {});
-               feed.begin("ObjectEnd", document_->place());
-               feed.send();
-             });
-           }),
-           "the mesh is left out");
-  }
+  add_objects(materials);
   for (const MeshUse& use : uses_) {
     context_.progress.check_cancelled();
-    feed.with_attributes(document_->place(), [&] {
-      feed.transform("ConcatTransform", document_->place(), use.world_from_mesh);
-      if (!use.pose.empty() || counts[static_cast<size_t>(use.mesh)] < 2)
-        return add_shapes(materials, use.mesh, use.pose);
-      feed.begin("ObjectInstance", document_->place(), {object_name(use.mesh, document_->element("meshes", use.mesh))});
-      feed.send();
-    });
+    add_use(materials, use);
   }
   for (const PlacedNode& placed : nodes_)
     report(problem_of([&] {
@@ -132,6 +148,48 @@ void Reader::add_world() {
              if (light) add_light(placed, light->at("light").integer());
            }),
            "the light is left out");
+  report_motion();
+}
+
+void Reader::add_objects(const Materials& materials) {
+  for (size_t i = 0; i < is_object_.size(); ++i) {
+    if (!is_object_[i]) continue;
+    context_.progress.check_cancelled();
+    report(problem_of([&] { add_object(materials, i, {}, object_name(document_->element("meshes", i), i)); }),
+           "the mesh is left out");
+  }
+}
+
+void Reader::add_object(const Materials& materials, uint64_t mesh, const Pose& pose, const std::string& name) {
+  DirectiveFeed& feed = context_.feed;
+  feed.with_attributes(document_->place(), [&] {
+    feed.transform("Transform", document_->place(), DAffine(1.0));
+    feed.begin("ObjectBegin", document_->place(), {name});
+    feed.send();
+    add_shapes(materials, mesh, pose);
+    feed.begin("ObjectEnd", document_->place());
+    feed.send();
+  });
+}
+
+void Reader::add_use(const Materials& materials, const MeshUse& use) {
+  DirectiveFeed& feed = context_.feed;
+  const bool shared = use.pose.empty() && is_object_[static_cast<size_t>(use.mesh)];
+  std::string name;
+  if (shared || use.alone()) name = object_name(document_->element("meshes", use.mesh), use.mesh);
+  if (use.alone()) {
+    name += "@" + std::to_string(nodes_[use.placed].node);
+    add_object(materials, use.mesh, use.pose, name);
+  }
+  const DAffine world_from_node = use.placed == kNoNode ? DAffine(1.0) : nodes_[use.placed].world_from_node;
+  for (const DAffine& node_from_mesh : use.node_from_mesh)
+    feed.with_attributes(document_->place(), [&] {
+      feed.transform("ConcatTransform", document_->place(), compose(world_from_node, node_from_mesh));
+      if (name.empty()) return add_shapes(materials, use.mesh, use.pose);
+      feed.begin("ObjectInstance", document_->place(), {name});
+      if (use.motion) feed.moves({use.motion->track, compose(use.motion->inner, node_from_mesh)});
+      feed.send();
+    });
 }
 
 void Reader::add_shapes(const Materials& materials, uint64_t number, const Pose& pose) {
@@ -156,6 +214,8 @@ void Reader::add_light(const PlacedNode& placed, uint64_t number) {
   const Vec3 power =
       intensity * Vec3(static_cast<float>(colour[0]), static_cast<float>(colour[1]), static_cast<float>(colour[2]));
   DirectiveFeed& feed = context_.feed;
+  if (placed.mover != kNoNode)
+    feed.reporter().note(document_->place(), light.path() + " stands still, though its node moves");
   const std::array<float, 3> origin = {0, 0, 0}, ahead = {0, 0, -1}, behind = {0, 0, 1};
   feed.with_attributes(document_->place(), [&] {
     feed.transform("ConcatTransform", document_->place(), placed.world_from_node);

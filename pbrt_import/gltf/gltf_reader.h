@@ -2,10 +2,16 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
+#include "pbrt_import/gltf/gltf_animation.h"
 #include "pbrt_import/gltf/gltf_document.h"
 #include "pbrt_import/gltf/gltf_materials.h"
+#include "pbrt_import/gltf/gltf_motion.h"
 #include "pbrt_import/gltf/gltf_nodes.h"
 #include "pbrt_import/gltf/gltf_pose.h"
 
@@ -14,33 +20,51 @@ namespace packtrace::gltf {
 /// Reads a glTF 2.0 file as part of a scene. Cameras belong before the world, so reading has two steps.
 class Reader {
 public:
-  /// Reads the document and places its nodes. Throws like Document and place_nodes().
-  Reader(const std::filesystem::path& file, uint32_t file_number, const MeshFileContext& context);
+  /// Reads the document and places its nodes. Throws like Document, Animation and place_nodes().
+  /// @param world_from_file as for the other mesh files
+  Reader(const std::filesystem::path& file, uint32_t file_number, const MeshFileContext& context,
+         const DAffine& world_from_file);
 
   /// Adds the cameras, the last one first, since pbrt renders with the last.
-  /// @param world_from_file as for the other mesh files
-  void add_cameras(const DAffine& world_from_file);
-  /// Adds materials, meshes, their instances, and lights. A mesh that several nodes use becomes an object with
-  /// instances. What is malformed is reported and left out.
+  void add_cameras();
+  /// Adds materials, meshes, their instances, and lights. A mesh that moves, or that several nodes use, becomes an
+  /// object with instances. What is malformed is reported and left out.
   void add_world();
 
 private:
-  /// A node with a mesh, times its instances.
+  /// A node with a mesh.
   struct MeshUse {
     uint64_t mesh = 0;
-    DAffine world_from_mesh{1.0};
+    size_t placed = kNoNode;                              ///< the node; none for skins, which joints move
+    std::vector<DAffine> node_from_mesh = {DAffine(1.0)}; ///< of its instances
     Pose pose;
+    std::optional<NodeMotion> motion;
+    /// Whether the mesh is in an object of its own: it is deformed, and moves as a whole.
+    bool alone() const { return !pose.empty() && motion.has_value(); }
   };
-  void add_camera(const PlacedNode& placed, uint64_t camera, const DAffine& world_from_file);
+  void add_camera(size_t placed, uint64_t camera);
   void collect_meshes();
+  void collect_mesh(size_t placed, Skins& skins);
+  void add_objects(const Materials& materials);
+  void add_object(const Materials& materials, uint64_t mesh, const Pose& pose, const std::string& name);
+  void add_use(const Materials& materials, const MeshUse& use);
   void add_shapes(const Materials& materials, uint64_t mesh, const Pose& pose);
   void add_light(const PlacedNode& placed, uint64_t light);
+  void report_motion();
+  std::span<const PlacedNode> posed() const { return posed_.empty() ? nodes_ : posed_; }
   void report(const std::string& problem, std::string_view consequence);
 
   MeshFileContext context_;
+  DAffine world_from_file_;
   std::unique_ptr<Document> document_;
+  Animation animation_;
+  double pose_time_;
   std::vector<PlacedNode> nodes_;
+  std::vector<PlacedNode> posed_; ///< at the time of morphs and skins; empty: as nodes_
+  NodeTracks tracks_;
   std::vector<MeshUse> uses_;
+  bool deforms_ = false;           ///< the animation moves morph targets or joints of a mesh
+  std::vector<uint8_t> is_object_; ///< by mesh: it moves or has several users that are not deformed
 };
 
 } // namespace packtrace::gltf

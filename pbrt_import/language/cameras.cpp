@@ -107,6 +107,7 @@ void CameraCollector::add_camera(const Directive& directive, const TransformPair
   entry.world_from_camera.start = inverse(camera_from_world.start);
   entry.world_from_camera.end = inverse(camera_from_world.end);
   camera.world_from_camera = entry.world_from_camera.start;
+  entry.track = directive.motion.track;
   entries_.push_back(std::move(entry));
 }
 
@@ -215,6 +216,13 @@ void CameraCollector::settle(double time, TransformTimes times, std::vector<Anim
     fit_to_film(entry, film, reporter);
     animate_camera(entry, time, times, animations, reporter);
   }
+}
+
+std::vector<uint32_t> CameraCollector::tracks() const {
+  std::vector<uint32_t> tracks;
+  for (const Entry& entry : entries_) tracks.push_back(entry.track);
+  if (tracks.size() > 1) std::rotate(tracks.begin(), tracks.end() - 1, tracks.end());
+  return tracks;
 }
 
 std::vector<Camera> CameraCollector::finish() const {

@@ -38,6 +38,8 @@ public:
   /// before it. Call once, after the last option directive.
   void settle(double time, TransformTimes times, std::vector<AnimatedTransform>& animations, Reporter& reporter);
 
+  /// Tracks of the cameras in the order of finish(); kNoTrack: it follows none.
+  std::vector<uint32_t> tracks() const;
   /// Cameras with the last one of the file first, since pbrt renders with it; the others follow in file order.
   std::vector<Camera> finish() const;
 
@@ -60,6 +62,7 @@ private:
     Camera camera;
     Place place;
     TransformPair world_from_camera;
+    uint32_t track = kNoTrack;
     std::optional<float> frame_aspect;
     std::optional<Film> film;
   };

@@ -11,9 +11,16 @@
 #include "pbrt_import/language/directive_info.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/parameters.h"
+#include "pbrt_import/scene/rigid_motion.h"
 #include "pbrt_import/text/source_stack.h"
 
 namespace packtrace {
+
+/// Motion that readers of other formats give to an instance or a camera: world(t) = track(t) inner.
+struct TrackedMotion {
+  uint32_t track = kNoTrack; ///< number that SceneBuilder gave it
+  DAffine inner{1.0};        ///< of instances; the identity for cameras
+};
 
 /// One directive with its arguments. It has as many numbers and names as its kind requires; MediumInterface has one or
 /// two names, and names[0] of ActiveTransform is its word.
@@ -26,6 +33,7 @@ struct Directive {
   uint32_t name_count = 0;
   ParameterList parameters;
   MemoryReservation memory; ///< reservation for large parameters
+  TrackedMotion motion;     ///< of ObjectInstance and Camera; never of text
   bool damaged = false;     ///< its numbers or names are malformed, which was reported; only kind is valid
 };
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/builder/scene_builder.h"
@@ -40,6 +41,11 @@ public:
   void texture(std::string_view name, std::string_view texture);
   /// Sends a Transform or ConcatTransform.
   void transform(std::string_view keyword, const Place& place, const DAffine& map);
+  /// Adds a track for moves(); returns its number.
+  uint32_t add_track(MotionTrack track) { return builder_.add_track(std::move(track)); }
+  /// Moves the ObjectInstance or Camera that is being made. Where it stands at the scene's time, the current transform
+  /// says.
+  void moves(const TrackedMotion& motion) { directive_.motion = motion; }
   /// Executes the directive. Throws like SceneBuilder::handle(); MemoryError with the directive's place.
   void send();
 

@@ -76,8 +76,8 @@ Place MeshFiles::read() {
   for (size_t i = 0; i < files_.size(); ++i)
     if (scene_format(files_[i]) == SceneFormat::kGltf)
       with_name(files_[i], [&] {
-        gltf_readers_[i] = std::make_unique<gltf::Reader>(files_[i], places_[i].file, context_);
-        gltf_readers_[i]->add_cameras(world_from_file_);
+        gltf_readers_[i] = std::make_unique<gltf::Reader>(files_[i], places_[i].file, context_, world_from_file_);
+        gltf_readers_[i]->add_cameras();
       });
   feed.begin("WorldBegin", places_.front());
   feed.send();

@@ -70,6 +70,8 @@ private:
     }
     for (const AnimatedInstance& animated : scene_.animated_instances)
       zeros[scene_.instances[animated.instance].object] = DVec3(0.0);
+    for (const InstanceMotion& moving : scene_.motion.instances)
+      zeros[scene_.instances[moving.instance - scene_.shapes.size()].object] = DVec3(0.0);
     bool any = false;
     for (size_t i = 0; i < zeros.size(); ++i) {
       if (zeros[i] == DVec3(0.0)) continue;
@@ -88,11 +90,22 @@ private:
     move_shapes(scene_.shapes, origin);
     for (DAffine& map : maps_) map[3] -= origin;
     for (AnimatedInstance& animated : scene_.animated_instances) move_animation(animated.animation, origin);
+    move_tracks(origin);
     for (Camera& camera : scene_.cameras) {
       camera.world_from_camera = moved(camera.world_from_camera, -origin);
       move_animation(camera.animation, origin);
     }
     for (Light& light : scene_.lights) light.position -= origin;
+  }
+
+  /// Moves the tracks that lead to the world.
+  void move_tracks(DVec3 origin) {
+    std::vector<bool> outer(scene_.motion.tracks.size(), false);
+    for (const InstanceMotion& moving : scene_.motion.instances) outer[moving.track] = true;
+    for (const CameraMotion& moving : scene_.motion.cameras) outer[moving.track] = true;
+    for (size_t i = 0; i < outer.size(); ++i)
+      if (outer[i])
+        for (MotionKey& key : scene_.motion.tracks[i].keys) key.translation -= origin;
   }
 
   void move_shapes(std::vector<Shape>& shapes, DVec3 zero) {

@@ -8,12 +8,6 @@
 namespace packtrace {
 namespace {
 
-MotionTrack constant(const DAffine& map) {
-  MotionTrack track;
-  track.keys.push_back({0.0, map[3], glm::dquat(1.0, 0.0, 0.0, 0.0), glm::dmat3(map)});
-  return track;
-}
-
 MotionTrack track_of(const AnimatedTransform& animation) {
   MotionTrack track;
   const auto add = [&](double time, const TransformKey& key) {
@@ -102,7 +96,7 @@ private:
       const DAffine world_from_object(instance.world_from_object);
       for (const Part& part : parts) {
         InstanceMotion moving{number_of(instances.size()), 0, part.track};
-        moving.track = track ? *track : add_track(constant(world_from_object));
+        moving.track = track ? *track : add_track(constant_track(world_from_object));
         motion().instances.push_back(moving);
         instances.push_back({part.object, Affine(compose(world_from_object, part.parent_from_mesh))});
       }
@@ -120,6 +114,12 @@ private:
 };
 
 } // namespace
+
+MotionTrack constant_track(const DAffine& map) {
+  MotionTrack track;
+  track.keys.push_back({0.0, map[3], glm::dquat(1.0, 0.0, 0.0, 0.0), glm::dmat3(map)});
+  return track;
+}
 
 void separate_motion(Scene& scene) {
   if (!scene.animations.empty()) Separator(scene).run();

@@ -1,5 +1,6 @@
 #include "runtime/commands/commands.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
+#include "pbrt_import/gltf_sequence.h"
 #include "pbrt_import/ply_sequence.h"
 #include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/bake_options.h"
@@ -62,10 +64,30 @@ void print_results(BinaryOutput* output, const BakeReport& baked, const ImportRe
 
 /// Adds what moves: the scene's own motion and that of the keys.
 void add_motion_of(const BakeOptions& options, const GlobalOptions& globals, Scene& scene) {
-  if (options.motion != "off") separate_motion(scene);
+  if (options.motion == "off")
+    scene.motion = {};
+  else
+    separate_motion(scene);
   if (options.keys.empty()) return;
   refuse_to_replace({options.keys}, options.output);
   add_motion(scene.motion, read_motion_keys(options.keys, motion_targets(scene), globals.memory));
+}
+
+/// Finds the frames of the meshes that --sequence names.
+void add_sequences(const BakeOptions& options, const GlobalOptions& globals, const ImportResult& imported,
+                   BakeConfig& config, Progress& progress) {
+  const double fps = options.sequence_fps.value_or(24.0);
+  for (const std::string& pattern : options.sequences) {
+    if (pattern != kAnimationSequence) {
+      config.sequences.push_back(
+          find_mesh_sequence(imported.scene, imported.files, options.input, pattern, options.sequence_start, fps));
+      continue;
+    }
+    const std::vector<std::filesystem::path> files(options.inputs.begin(), options.inputs.end());
+    const std::vector<MeshSequence> found =
+        find_gltf_sequences(imported, files, import_options(options.scene, globals, config.textures), fps, progress);
+    config.sequences.insert(config.sequences.end(), found.begin(), found.end());
+  }
 }
 
 int run(const BakeOptions& given, const GlobalOptions& globals) {
@@ -90,6 +112,8 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
 
   options.scene.keep_unused_objects = !options.distance_levels.empty(); // levels need no instance
   options.scene.keep_shading = config.purpose == baked::kShading;
+  if (std::ranges::find(options.sequences, kAnimationSequence) != options.sequences.end())
+    options.scene.pose_time = 0.0;
   const Stopwatch importing;
   ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   BakeTimings timings;
@@ -97,9 +121,7 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
   refuse_to_replace(imported.files, options.output);
   add_motion_of(options, globals, imported.scene);
 
-  for (const std::string& pattern : options.sequences)
-    config.sequences.push_back(find_mesh_sequence(imported.scene, imported.files, options.input, pattern,
-                                                  options.sequence_start, options.sequence_fps.value_or(24.0)));
+  add_sequences(options, globals, imported, config, progress);
 
   if (!options.distance_levels.empty()) {
     refuse_to_replace({options.distance_levels}, options.output);

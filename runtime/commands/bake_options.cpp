@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene_format.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/option_checks.h"
 
@@ -173,12 +174,14 @@ void add_distance_level_option(CLI::App& verb, BakeOptions& options) {
 
 void add_sequence_options(CLI::App& verb, BakeOptions& options) {
   constexpr const char* kGroup = "Meshes that move";
-  verb.add_option("--sequence", options.sequences,
-                  "PLY files of one topology that move a mesh of the scene, such as 'grass_%04d.ply' with one %d or "
-                  "%0Nd for the frame's number; relative to the working directory or the scene. The first frame is "
-                  "the file that the scene refers to, the last the one before the first missing number. Repeat it for "
-                  "several meshes. Their geometries get no LOD levels")
-      ->type_name("PATTERN")
+  verb.add_option(
+          "--sequence", options.sequences,
+          "PLY files of one topology that move a mesh of the scene, such as 'grass_%04d.ply' with one %d or "
+          "%0Nd for the frame's number; relative to the working directory or the scene. The first frame is "
+          "the file that the scene refers to, the last the one before the first missing number. Repeat it for "
+          "several meshes. 'animation' stands for what the animation of a glTF file deforms by morph targets and "
+          "skins. Their geometries get no LOD levels")
+      ->type_name("PATTERN|animation")
       ->allow_extra_args(false)
       ->take_all()
       ->group(kGroup);
@@ -291,6 +294,10 @@ BakeConfig make_config(const BakeOptions& options) {
     throw Error(ErrorKind::kUsage, "--sequence-fps, --sequence-start and --sequence-group require --sequence");
   if (!options.sequences.empty() && !options.targets.empty())
     throw Error(ErrorKind::kUsage, "--target measures still scenes: it cannot be combined with --sequence");
+  if (std::ranges::find(options.sequences, kAnimationSequence) != options.sequences.end())
+    for (const std::string& input : options.inputs)
+      if (scene_format(input) == SceneFormat::kPbrt)
+        throw Error(ErrorKind::kUsage, "--sequence animation only applies to glTF files");
   if (options.sequence_fps && !(*options.sequence_fps > 0.0 && std::isfinite(*options.sequence_fps)))
     throw Error(ErrorKind::kUsage, "--sequence-fps must be a positive number");
   config.sequence_group = options.sequence_group.value_or(config.sequence_group);

@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -14,6 +15,9 @@
 namespace packtrace {
 
 inline constexpr std::array<const char*, 3> kPresets{"smallest", "balanced", "exact"};
+
+/// The --sequence of what a glTF file's animation deforms.
+inline constexpr std::string_view kAnimationSequence = "animation";
 
 /// The options of `bake`.
 struct BakeOptions {

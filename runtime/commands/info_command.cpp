@@ -26,9 +26,9 @@ namespace {
 
 /// The time over which things of a scene are animated; empty if nothing is.
 TimeSpan animated_time(const Scene& scene) {
-  TimeSpan span;
+  TimeSpan span = time_span(scene.motion);
   for (const AnimatedTransform& animation : scene.animations) {
-    const bool first = &animation == &scene.animations.front();
+    const bool first = span.begin_s > span.end_s;
     span = {first ? animation.start_time : std::min(span.begin_s, animation.start_time),
             first ? animation.end_time : std::max(span.end_s, animation.end_time)};
   }
@@ -70,6 +70,7 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
   Bounds bounds = world_bounds(scene);
   bounds.lo += scene.origin, bounds.hi += scene.origin;
   const TimeSpan time = animated_time(scene);
+  const bool still = time.begin_s > time.end_s;
   nlohmann::json cameras = nlohmann::json::array();
   for (const Camera& camera : scene.cameras) cameras.push_back(to_json(camera));
   return {
@@ -99,8 +100,8 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
        {{"shapes", statistics.animated_shapes},
         {"instances", statistics.animated_instances},
         {"cameras", statistics.animated_cameras},
-        {"begin_s", scene.animations.empty() ? nlohmann::json() : nlohmann::json(time.begin_s)},
-        {"end_s", scene.animations.empty() ? nlohmann::json() : nlohmann::json(time.end_s)}}},
+        {"begin_s", still ? nlohmann::json() : nlohmann::json(time.begin_s)},
+        {"end_s", still ? nlohmann::json() : nlohmann::json(time.end_s)}}},
       {"ignored", statistics.ignored},
       {"problems", problems_json(statistics)},
       {"directives", statistics.directives},

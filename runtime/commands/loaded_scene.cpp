@@ -55,7 +55,7 @@ void add_scene_options(CLI::App& verb, SceneOptions& options) {
       ->group(kGroup);
   verb.add_option("--time", options.time,
                   "Time at which to evaluate animated transforms, in the unit of TransformTimes (default: the time at "
-                  "which the camera's shutter opens)")
+                  "which the camera's shutter opens); of glTF files seconds (default 0)")
       ->type_name("T")
       ->group(kGroup);
   constexpr const char* kMeshGroup = "Options for mesh files (.ply, .obj, .stl, .gltf, .glb)";
@@ -64,6 +64,9 @@ void add_scene_options(CLI::App& verb, SceneOptions& options) {
       ->group(kMeshGroup);
   verb.add_option("--scale", options.scale, "Factor of all coordinates (default 1)")
       ->check(number_in(1e-30, 1e30))
+      ->group(kMeshGroup);
+  verb.add_option("--animation", options.animation, "Animation of a glTF file, by name or by number from 0 (default 0)")
+      ->type_name("NAME|N")
       ->group(kMeshGroup);
   verb.add_flag("--allow-outside", options.allow_outside, "Read files outside a glTF file's folder that it names")
       ->group(kMeshGroup);
@@ -74,6 +77,7 @@ std::vector<std::string> scene_words(const SceneOptions& options) {
   const auto add = [&](const char* name, const std::string& value) { words.insert(words.end(), {name, value}); };
   if (options.world) add("--world", std::to_string(*options.world));
   if (options.time) add("--time", number_text(*options.time));
+  if (options.animation) add("--animation", *options.animation);
   if (options.up) add("--up", *options.up);
   if (options.scale) add("--scale", number_text(*options.scale));
   if (options.allow_outside) words.emplace_back("--allow-outside");
@@ -84,10 +88,12 @@ std::vector<std::string> scene_words(const SceneOptions& options) {
 const char* option_without_use(const std::filesystem::path& file, const SceneOptions& options) {
   const bool baked = is_baked_file(file), mesh = !baked && scene_format(file) != SceneFormat::kPbrt;
   if (baked || mesh) {
-    if (options.time && scene_format(file) != SceneFormat::kGltf) return "--time";
+    const bool gltf = mesh && scene_format(file) == SceneFormat::kGltf;
+    if (options.time && !gltf) return "--time";
+    if (options.animation && !gltf) return "--animation";
     if (options.world.value_or(1) != 1) return "--world";
   }
-  if (!mesh) return options.up ? "--up" : options.scale ? "--scale" : nullptr;
+  if (!mesh) return options.up ? "--up" : options.scale ? "--scale" : options.animation ? "--animation" : nullptr;
   return nullptr;
 }
 
@@ -132,16 +138,7 @@ nlohmann::json problems_json(const ImportStatistics& statistics) {
       {"notes", count(Severity::kNote)}, {"warnings", count(Severity::kWarning)}, {"errors", count(Severity::kError)}};
 }
 
-ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
-                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
-                                bool keep_textures) {
-  const SceneFormat format = scene_format(file);
-  if (format == SceneFormat::kPbrt) require_scene_text(file);
-  if (const char* const option = option_without_use(file, scene_options))
-    throw FileError(ErrorKind::kUsage, file,
-                    std::string(option) + (format == SceneFormat::kPbrt ? " only applies to mesh files"
-                                                                        : " only applies to .pbrt scenes"));
-  Diagnostics diagnostics;
+ImportOptions import_options(const SceneOptions& scene_options, const GlobalOptions& globals, bool keep_textures) {
   ImportOptions options;
   options.strict = scene_options.strict;
   options.world = scene_options.world;
@@ -154,6 +151,22 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   options.keep_unused_objects = scene_options.keep_unused_objects;
   options.keep_shading = scene_options.keep_shading;
   options.memory = globals.memory;
+  options.animation = scene_options.animation;
+  options.pose_time = scene_options.pose_time;
+  return options;
+}
+
+ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
+                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
+                                bool keep_textures) {
+  const SceneFormat format = scene_format(file);
+  if (format == SceneFormat::kPbrt) require_scene_text(file);
+  if (const char* const option = option_without_use(file, scene_options))
+    throw FileError(ErrorKind::kUsage, file,
+                    std::string(option) + (format == SceneFormat::kPbrt ? " only applies to mesh files"
+                                                                        : " only applies to .pbrt scenes"));
+  Diagnostics diagnostics;
+  const ImportOptions options = import_options(scene_options, globals, keep_textures);
   ImportResult result;
   try {
     if (scene_options.joined_files.empty()) {

@@ -32,23 +32,31 @@ struct SceneOptions {
   std::optional<std::string> up;         ///< axis of mesh files: "x", "y" or "z"
   std::optional<double> scale;           ///< of mesh files
   bool allow_outside = false;            ///< glTF files may name files outside their folder
+  std::optional<std::string> animation;  ///< name or number of a glTF file's animation
+  std::optional<double> pose_time;       ///< as in ImportOptions; no option of its own
   std::vector<std::string> joined_files; ///< further mesh files of the scene; no option of its own
   bool keep_unused_objects = false;      ///< as in ImportOptions; no option of its own
   bool keep_shading = false;             ///< as in ImportOptions; no option of its own
 };
 
-/// Adds --strict, --world, --time, --up, --scale and --allow-outside to a verb. `options` must outlive the verb.
+/// Adds --strict, --world, --time, --animation, --up, --scale and --allow-outside to a verb. `options` must outlive the
+/// verb.
 void add_scene_options(CLI::App& verb, SceneOptions& options);
 
 /// The given options as words of a command line.
 std::vector<std::string> scene_words(const SceneOptions& options);
 
-/// Name of the first given option that a file cannot follow: all but --strict for a baked file, --world and --time for
-/// a mesh file, --up and --scale for a pbrt scene; null if there is none.
+/// Name of the first given option that a file cannot follow: all but --strict for a baked file, --world for a mesh
+/// file, --time and --animation for one that is not glTF, --up, --scale and --animation for a pbrt scene; null if there
+/// is none.
 const char* option_without_use(const std::filesystem::path& file, const SceneOptions& options);
 
 /// Throws Error(kUsage) if an option chooses what was chosen when a baked file was made.
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options);
+
+/// The options of an import.
+/// @param keep_textures as in ImportOptions
+ImportOptions import_options(const SceneOptions& scene_options, const GlobalOptions& globals, bool keep_textures);
 
 /// Imports a pbrt or mesh file, with options.joined_files, and prints its diagnostics.
 /// @param keep_textures as in ImportOptions

@@ -56,6 +56,7 @@ std::vector<std::string> loading_words(const RenderOptions& o) {
   };
   add("--world", o.scene.world);
   add("--time", o.scene.time);
+  add("--animation", o.scene.animation);
   add("--backend", o.backend);
   add("--gpu-device", o.gpu_device);
   add("--bvh", o.bvh);

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/end_to_end/workbench.h"
+#include "tests/pbrt_import/gltf_documents.h"
 
 namespace packtrace::test {
 namespace {
@@ -53,6 +54,62 @@ TEST_F(MotionCommand, MotionMayBeLeftOut) {
   EXPECT_EQ(report.at("bytes").at("rigid_motion"), 0);
   EXPECT_EQ(run_packtrace({"info", file_}).out.find("moving"), std::string::npos);
   EXPECT_EQ(run_packtrace({"bake", scene_, "--dry-run", "--motion", "some"}).exit_code, 2);
+}
+
+/// A square passes a camera from 0 to 1 s, and a skin bends beside it from 0 to 2 s in another animation.
+class GltfMotionCommand : public MotionCommand {
+protected:
+  GltfMotionCommand() {
+    GltfBuilder gltf = gltf_skin();
+    const nlohmann::json square = {{"attributes", {{"POSITION", gltf.positions(kSquare)}}},
+                                   {"indices", gltf.accessor<uint16_t>("SCALAR", 5123, {0, 1, 2, 0, 2, 3})}};
+    const size_t mesh = gltf.mesh(square), node = gltf.node({{"mesh", mesh}});
+    gltf.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.1}}}}};
+    gltf.node({{"camera", 0}, {"translation", {0, 0, 6}}});
+    add_animation(gltf, {{node, "translation", "LINEAR", {0, 1}, {-4, 0, 0, 2, 0, 0}}}, "pass");
+    scene_ = bench_ / "moving.gltf";
+    write_text(scene_, gltf.text());
+  }
+};
+
+TEST_F(GltfMotionCommand, NodesMoveInPictures) {
+  const nlohmann::json motion = bake({"--animation", "pass"}).at("motion");
+  EXPECT_EQ(motion.at("instances"), 1);
+  EXPECT_EQ(motion.at("end_s"), 1.0);
+  EXPECT_EQ(bake({"--animation", "pass", "--motion", "off"}).at("motion").at("instances"), 0);
+  bake({"--animation", "pass"});
+  const auto pictures = [&](const std::string& file, const std::string& name, std::vector<std::string> more) {
+    std::vector<std::string> words{"render",   file,    "-o",          bench_ / (name + "_%d.png"),
+                                   "--path",   "scene", "--fps",       "2",
+                                   "--frames", "3",     "--subframes", "1",
+                                   "--size",   "32x18", "-q"};
+    words.insert(words.end(), more.begin(), more.end());
+    const CommandResult result = run_packtrace(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::vector<std::string> bytes;
+    for (int i = 0; i < 3; ++i) bytes.push_back(read_text(bench_ / (name + "_" + std::to_string(i) + ".png")));
+    return bytes;
+  };
+  for (const auto& [file, more] :
+       {std::pair{file_, std::vector<std::string>{}}, {scene_, std::vector<std::string>{"--animation", "pass"}}}) {
+    const std::vector<std::string> shown = pictures(file, file == file_ ? "baked" : "scene", more);
+    EXPECT_NE(shown[0], shown[1]) << file;
+  }
+}
+
+TEST_F(GltfMotionCommand, SkinsAreSequences) {
+  const nlohmann::json report = bake({"--sequence", "animation", "--sequence-fps", "4"});
+  ASSERT_EQ(report.at("sequences").size(), 1u) << report;
+  EXPECT_EQ(report.at("sequences")[0].at("frames"), 8);
+  const auto refused = [&](const std::string& scene, const std::string& animation, const std::string& what) {
+    const CommandResult result =
+        run_packtrace({"bake", scene, "-o", file_, "--force", "--sequence", "animation", "--animation", animation});
+    EXPECT_NE(result.exit_code, 0);
+    EXPECT_NE(result.err.find(what), std::string::npos) << result.err;
+  };
+  refused(scene_, "pass", "no animation deforms its meshes");
+  refused(scene_, "fly", "there is no animation \"fly\"");
+  refused(bench_.scene(), "0", "--sequence animation only applies to glTF files");
 }
 
 TEST_F(MotionCommand, TheSameBytesForAnyNumberOfThreads) {

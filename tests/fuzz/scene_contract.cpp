@@ -115,6 +115,17 @@ void require_animation(const AnimatedTransform& animation) {
   for (int column = 0; column < 4; ++column) require(is_finite(between[column]), "animation leaves the finite numbers");
 }
 
+void require_track(const MotionTrack& track, size_t least_keys) {
+  require(track.keys.size() >= least_keys, "track that does not move");
+  for (size_t i = 0; i < track.keys.size(); ++i) {
+    const MotionKey& key = track.keys[i];
+    require(std::isfinite(key.time_s) && (i == 0 || track.keys[i - 1].time_s < key.time_s), "times of a track");
+    require(std::abs(glm::dot(key.rotation, key.rotation) - 1.0) < 1e-9, "rotation not of unit length");
+    require(is_finite(key.translation), "translation of a track");
+    for (int column = 0; column < 3; ++column) require(is_finite(key.scale[column]), "scale of a track");
+  }
+}
+
 void require_camera(const Camera& camera) {
   require(is_affine_invertible(camera.world_from_camera), "camera transform");
   require(std::isfinite(camera.fov_degrees), "field of view");
@@ -128,7 +139,7 @@ void require_camera(const Camera& camera) {
 void require_scene_contract(const Scene& scene) {
   Uses meshes(scene.meshes.size()), materials(scene.materials.size()), masks(scene.masks.size());
   Uses textures(scene.textures.size());
-  Uses objects(scene.objects.size()), animations(scene.animations.size());
+  Uses objects(scene.objects.size()), animations(scene.animations.size()), tracks(scene.motion.tracks.size());
   const auto require_animation_number = [&](uint32_t number) {
     if (number != kNotAnimated) animations.add(number, "animation number");
   };
@@ -170,7 +181,24 @@ void require_scene_contract(const Scene& scene) {
     require(moving.animation != kNotAnimated, "animated instance without an animation");
     require_animation_number(moving.animation);
   }
-  require(meshes.all() && materials.all() && masks.all() && textures.all() && objects.all() && animations.all(),
+  for (size_t i = 0; i < scene.motion.instances.size(); ++i) {
+    const InstanceMotion& moving = scene.motion.instances[i];
+    const size_t count = scene.shapes.size() + scene.instances.size();
+    require(moving.instance >= scene.shapes.size() && moving.instance < count, "number of a moving instance");
+    require(i == 0 || scene.motion.instances[i - 1].instance < moving.instance, "order of the moving instances");
+    tracks.add(moving.track, "track number");
+    require_track(scene.motion.tracks[moving.track], 2);
+    if (moving.inner_track == kNoTrack) continue;
+    tracks.add(moving.inner_track, "inner track number");
+    require_track(scene.motion.tracks[moving.inner_track], 1);
+  }
+  for (const CameraMotion& moving : scene.motion.cameras) {
+    require(moving.camera < scene.cameras.size(), "number of a moving camera");
+    tracks.add(moving.track, "track number");
+    require_track(scene.motion.tracks[moving.track], 2);
+  }
+  require(meshes.all() && materials.all() && masks.all() && textures.all() && objects.all() && animations.all() &&
+              tracks.all(),
           "something unused was kept");
 }
 
