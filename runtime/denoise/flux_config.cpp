@@ -28,6 +28,7 @@ constexpr Setting<FluxConfig> kFluxSettings[] = {
     {{"guide_depth", "Relative distance from the other's tangent plane at which two pixels hardly mix", 0, 1},
      &F::guide_depth},
     {{"guide_slope", "The same in units of the disparity's change along the offset", 0, 10}, &F::guide_slope},
+    {{"guide_bend", "The same in units of the difference of both pixels' changes", 0, 10}, &F::guide_bend},
     {{"noise_tolerance", "Differences of patches count as noise up to this many times its variance", 0.1, 100},
      &F::noise_tolerance},
     {{"patch_limit", "Mean distance of patches at which pixels do not mix", 0.1, 25}, &F::patch_limit},

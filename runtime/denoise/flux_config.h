@@ -52,10 +52,14 @@ struct FluxConfig {
 
   /// Guide weight: it falls to its least value where a point's distance from the other's tangent plane, in disparity,
   /// reaches guide_depth * disparity ... [0..1]
-  float guide_depth = 0.01f;
+  float guide_depth = 0.0016f;
 
-  /// ... + guide_slope * disparity change along the offset. [0..10]
+  /// ... + guide_slope * the lesser disparity change along the offset of both pixels ... [0..10]
   float guide_slope = 0.5f;
+
+  /// ... + guide_bend * the difference of these changes, which is twice the distance on an evenly curved surface; at
+  /// most five times guide_depth * disparity. [0..10]
+  float guide_bend = 1.4f;
 
   /// Differences of patches count as noise up to this many times its variance. [0.1..100]
   float noise_tolerance = 2.0f;

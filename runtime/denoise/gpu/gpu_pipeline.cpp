@@ -24,7 +24,7 @@ gpu::DenoiseRecord terms_of(const FluxConfig& config) {
   const CorrectTerms correct = correct_terms(config);
   out.fast_share = correct.fast_share, out.gamma = correct.gamma;
   out.change_tolerance = correct.tolerance, out.response = correct.response;
-  out.guide_depth = config.guide_depth, out.guide_slope = config.guide_slope;
+  out.guide_depth = config.guide_depth, out.guide_slope = config.guide_slope, out.guide_bend = config.guide_bend;
   const PatchTerms patch = patch_terms(config);
   out.no_distance = patch.no_distance, out.shift = static_cast<uint32_t>(patch.shift);
   out.limit = patch.limit, out.stretch = patch.stretch;

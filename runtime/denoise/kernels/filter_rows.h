@@ -43,7 +43,7 @@ struct SurfaceRow {
 };
 
 /// Least guide weight, of 255, of two pixels that both hit something.
-inline constexpr uint8_t kMinGuide = 3;
+inline constexpr uint8_t kMinGuide = 2;
 
 /// Least guide weight of two pixels without any neighbour on their surfaces, as in foliage: there is no edge to keep
 /// there, and the noise of few samples is larger than the differences of neighbours.
@@ -51,8 +51,11 @@ inline constexpr uint8_t kLoneGuide = 17;
 /// Sum of the guide weights of a pixel's eight neighbours from which on it is not alone.
 inline constexpr int kCompany = 3 * 255;
 
+/// Largest share of GuideTerms::bend in the tolerance, in units of that of GuideTerms::depth.
+inline constexpr float kMostBend = 5.0f;
+
 struct GuideTerms {
-  float depth, slope;
+  float depth, slope, bend;
 };
 
 /// Guide weights of the pairs that begin in one row, in units of 1/255.

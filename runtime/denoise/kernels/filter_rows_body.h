@@ -25,9 +25,11 @@ inline uint8_t guide_weight(const SurfaceRow& p, int at_p, const SurfaceRow& q, 
   const float rise_p = p.dx[at_p] * offset_x + p.dy[at_p] * offset_y;
   const float rise_q = q.dx[at_q] * offset_x + q.dy[at_q] * offset_y;
   const float distance = greater(std::abs(difference - rise_p), std::abs(difference - rise_q));
-  // The flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette.
-  const float allowed = t.depth * lesser(p.disparity[at_p], q.disparity[at_q]) +
-                        t.slope * lesser(std::abs(rise_p), std::abs(rise_q)) + 1e-37f;
+  const float least = t.depth * lesser(p.disparity[at_p], q.disparity[at_q]);
+  // The flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette. There, their
+  // difference says nothing of a curvature, so it counts up to a limit.
+  const float allowed = least + t.slope * lesser(std::abs(rise_p), std::abs(rise_q)) +
+                        lesser(t.bend * std::abs(rise_p - rise_q), kMostBend * least) + 1e-37f;
   const float depth = greater(0.0f, 1.0f - distance / allowed);
   const int dot = p.nx[at_p] * q.nx[at_q] + p.ny[at_p] * q.ny[at_q] + p.nz[at_p] * q.nz[at_q];
   float cosine = lesser(greater(static_cast<float>(dot) * kSquaredNormalUnit, 0.0f), 1.0f);

@@ -81,6 +81,7 @@ void write_denoiser_constants(std::ostream& out) {
   write(out, "kLoneBase", kLoneBase);
   write(out, "kLoneYoung", kLoneYoung);
   write(out, "kMinGuide", float{kMinGuide});
+  write(out, "kMostBend", kMostBend);
   write(out, "kLoneGuide", uint32_t{kLoneGuide});
   write(out, "kCompany", uint32_t{kCompany});
   write(out, "kStraight", uint32_t{kStraight});

@@ -119,7 +119,7 @@ struct DenoiseRecord {
   float depth, slope, longest_still, longest_moving;
   float longest, fast_frames;
   float fast_share, gamma, change_tolerance, response;
-  float guide_depth, guide_slope;
+  float guide_depth, guide_slope, guide_bend;
   uint32_t no_distance, shift, limit, stretch;
   float noise_tolerance, prior, still_factor, still_power, moving_base, moving_gain, ratio_prior;
   float per_sample, young, distrust, most_spread;

@@ -177,6 +177,7 @@ inline constexpr std::array kDenoiseFields = {
     GlslField{"float", "response", offsetof(DenoiseRecord, response)},
     GlslField{"float", "guide_depth", offsetof(DenoiseRecord, guide_depth)},
     GlslField{"float", "guide_slope", offsetof(DenoiseRecord, guide_slope)},
+    GlslField{"float", "guide_bend", offsetof(DenoiseRecord, guide_bend)},
     GlslField{"uint", "no_distance", offsetof(DenoiseRecord, no_distance)},
     GlslField{"uint", "shift", offsetof(DenoiseRecord, shift)},
     GlslField{"uint", "limit", offsetof(DenoiseRecord, limit)},

@@ -54,8 +54,9 @@ uint guide_weight(int p, int q, vec2 offset) {
   precise float difference = dq - dp;
   precise float rise_p = s_dx[p] * offset.x + s_dy[p] * offset.y, rise_q = s_dx[q] * offset.x + s_dy[q] * offset.y;
   precise float away = greater(abs(difference - rise_p), abs(difference - rise_q));
-  precise float allowed =
-      terms.guide_depth * lesser(dp, dq) + terms.guide_slope * lesser(abs(rise_p), abs(rise_q)) + 1e-37;
+  precise float least = terms.guide_depth * lesser(dp, dq);
+  precise float allowed = least + terms.guide_slope * lesser(abs(rise_p), abs(rise_q)) +
+                          lesser(terms.guide_bend * abs(rise_p - rise_q), kMostBend * least) + 1e-37;
   precise float depth = greater(0.0, 1.0 - away / allowed);
   if (depth == 0.0) return uint(kMinGuide);
   ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh);

@@ -56,6 +56,7 @@ TEST(DenoiserConfig, EndsOfEveryRangeAreAcceptedAndWhatLiesBeyondIsRejected) {
   expect_float_range(&FluxConfig::reprojection_slope, 0.0f, 10.0f);
   expect_float_range(&FluxConfig::guide_depth, 0.0f, 1.0f);
   expect_float_range(&FluxConfig::guide_slope, 0.0f, 10.0f);
+  expect_float_range(&FluxConfig::guide_bend, 0.0f, 10.0f);
   expect_float_range(&FluxConfig::patch_limit, 0.1f, 25.0f);
   expect_float_range(&FluxConfig::variance_distrust, 0.0f, 1000.0f);
 }

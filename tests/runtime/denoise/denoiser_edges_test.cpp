@@ -94,6 +94,23 @@ TEST(DenoiserEdges, TiltedPlanesBlurLikeFlatOnes) {
   EXPECT_LE(tilted, 1.1 * rmse(wall(kSize)));
 }
 
+TEST(DenoiserEdges, CurvedSurfacesBlurLikeFlatOnes) {
+  const auto rmse = [](const GBuffer& g, const char* setting) {
+    DenoiserConfig config;
+    config.set(setting);
+    AoDenoiser denoiser(config);
+    return rmse_of(denoiser.next_frame(g, noise(kSize, 0.5f, 3)).ao, kSize, all(kSize),
+                   [](uint32_t, uint32_t) { return expected(0.5f); });
+  };
+  const GBuffer curved = walls([](GBuffer& g, size_t i, uint32_t x) {
+    const float from_middle = static_cast<float>(x) - 31.5f;
+    g.view_z[i] = 1.0f / (0.1f + 2e-5f * from_middle * from_middle); // 4 pixels away it leaves the plane by 0.3 %
+  });
+  const double flat = rmse(wall(kSize), "guide_bend=1.4");
+  EXPECT_LE(rmse(curved, "guide_bend=1.4"), 1.1 * flat);
+  EXPECT_GT(rmse(curved, "guide_bend=0"), 1.2 * flat);
+}
+
 TEST(DenoiserEdges, ContactShadowsOnOneSurfaceStaySharpOnceSampled) {
   AoDenoiser denoiser;
   const float left = 0.9f, right = 0.1f;

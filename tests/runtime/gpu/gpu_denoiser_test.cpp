@@ -269,6 +269,7 @@ TEST_F(GpuDenoiserTest, Settings) {
                               "reprojection_slope=5",
                               "guide_depth=0.5",
                               "guide_slope=4",
+                              "guide_bend=0",
                               "noise_tolerance=0.5",
                               "patch_limit=1",
                               "variance_prior=100",
