@@ -88,8 +88,9 @@ void PairGuides::compute(const Guides& guides, const FluxConfig& config, const F
   static_assert(sizeof(*memory.first.row(0)) == kPairOffsets.size());
   stride_ = memory.first.stride() * static_cast<ptrdiff_t>(kPairOffsets.size());
   width_ = static_cast<ptrdiff_t>(guides.size.width);
+  // With arguments instead of a function it would keep copies of them, and so of all guides.
   tbb::enumerable_thread_specific<GuideRows> threads(
-      guides, GuideTerms{config.guide_depth, config.guide_slope, config.guide_bend}, kernels);
+      [&] { return GuideRows(guides, {config.guide_depth, config.guide_slope, config.guide_bend}, kernels); });
   for_row_blocks(guides.size.height, [&](int first, int last) {
     GuideRows& rows = threads.local();
     rows.begin(first);
