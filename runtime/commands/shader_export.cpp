@@ -44,10 +44,11 @@ public:
   ShaderMaker(const BakedFile& file, const std::string& input, const ShaderOptions& options, const MemoryBudget& budget,
               Progress& progress)
       : file_(file), input_(input), budget_(budget), progress_(progress) {
+    if (options.proxy.proxy == "off")
+      throw Error(ErrorKind::kUsage, "--proxy off has no effect on shaders, which hold voxels");
     if (const std::span<const uint8_t> bytes = proxy_bytes(file); !bytes.empty()) stored_ = read_proxies(bytes);
     geometry_ = find_geometry(file, input, options.geometry, stored_);
     ProxyOptions proxy = options.proxy;
-    if (proxy.proxy == "off") throw Error(ErrorKind::kUsage, "--proxy off has no effect on shaders, which hold voxels");
     if (proxy.proxy == "sdf") throw Error(ErrorKind::kUsage, "shaders hold voxels: use --proxy voxels");
     proxy.proxy = "voxels";
     config_ = make_proxy_config(proxy);
