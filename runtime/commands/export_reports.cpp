@@ -8,6 +8,11 @@
 #include "runtime/commands/json_output.h"
 
 namespace packtrace {
+namespace {
+
+constexpr const char* kMotionLeftOut = "motion is left out: everything is where it was at the time of the bake\n";
+
+} // namespace
 
 nlohmann::json to_json(const ExportNames& names, const Vertex16Report& r) {
   return {{"verb", "export"},
@@ -69,6 +74,7 @@ nlohmann::json to_json(const ExportNames& names, const GltfReport& r) {
           {"plain_primitives", r.plain_primitives},
           {"simplified_materials", r.simplified_materials},
           {"skipped_cameras", r.skipped_cameras},
+          {"moving", r.moving},
           {"levels", r.levels},
           {"max_normal_error_degrees", r.max_normal_error_degrees},
           {"max_uv_error", r.max_uv_error},
@@ -100,6 +106,7 @@ std::string to_text(const ExportNames& names, const GltfReport& r) {
        "primitives are stored as floats: their lattice has too many bits for the codec, or Draco cannot encode them");
   note(r.simplified_materials, "materials lost their texture, because it is mapped differently from their alpha mask");
   note(r.skipped_cameras, "cameras were skipped, because glTF has no environment cameras");
+  if (r.moving) text += kMotionLeftOut;
   return text;
 }
 
@@ -127,7 +134,7 @@ std::string to_text(const ExportNames& names, const SceneReport& r) {
                   "{}: {:L} vertices, {:L} triangles; {:L} shapes, {:L} instances, {:L} materials, {:L} images; "
                   "{:L} bytes in all files\n",
                   names.output, r.vertices, r.triangles, r.shapes, r.instances, r.materials, r.images, r.file_bytes);
-  if (r.moving != 0) text += "motion is left out: everything is where it was at the time of the bake\n";
+  if (r.moving != 0) text += kMotionLeftOut;
   return text;
 }
 

@@ -77,7 +77,12 @@ TEST_F(GltfMotionCommand, NodesMoveInPictures) {
   EXPECT_EQ(motion.at("instances"), 1);
   EXPECT_EQ(motion.at("end_s"), 1.0);
   EXPECT_EQ(bake({"--animation", "pass", "--motion", "off"}).at("motion").at("instances"), 0);
+  const auto exported = [&] {
+    return run_packtrace({"export", file_, "-o", bench_ / "x.glb", "--force"}).out.find("motion is left out");
+  };
+  EXPECT_EQ(exported(), std::string::npos);
   bake({"--animation", "pass"});
+  EXPECT_NE(exported(), std::string::npos);
   const auto pictures = [&](const std::string& file, const std::string& name, std::vector<std::string> more) {
     std::vector<std::string> words{"render",   file,    "-o",          bench_ / (name + "_%d.png"),
                                    "--path",   "scene", "--fps",       "2",

@@ -205,6 +205,7 @@ private:
     report.meshes = model_.count("meshes"), report.nodes = model_.count("nodes");
     report.materials = model_.count("materials"), report.images = model_.count("images");
     report.cameras = model_.count("cameras");
+    report.moving = !file_.sections().rigid_motion.empty() || !file_.sections().deformation.empty();
     report.image_bytes = materials_.image_bytes(), report.simplified_materials = materials_.simplified();
     report.min_texture_psnr = materials_.lowest_psnr();
   }

@@ -21,6 +21,7 @@ struct GltfReport {
   uint64_t plain_primitives = 0; ///< stored as floats: the lattice has too many bits for the codec, or Draco fails
   /// Exported without their texture, because mask and texture have different transforms.
   uint64_t simplified_materials = 0;
+  bool moving = false;          ///< motion is left out: everything is at the time that was baked
   uint64_t skipped_cameras = 0; ///< environment cameras, which glTF lacks, and cameras without pixels
   // Errors against the baked file.
   double max_normal_error_degrees = 0.0; ///< of the codec meshopt
