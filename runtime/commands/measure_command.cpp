@@ -127,8 +127,8 @@ Words common_words(const GlobalOptions& globals) {
 
 /// Options of render for the tracer of packed files.
 Words tracer_words(const MeasureOptions& options) {
-  if (options.gpu_device && options.backend != "gpu")
-    throw Error(ErrorKind::kUsage, "--gpu-device requires --backend gpu");
+  if (options.gpu_device && !options.backend.starts_with("gpu"))
+    throw Error(ErrorKind::kUsage, "--gpu-device requires --backend gpu or gpu-rt");
   Words words;
   if (options.backend != MeasureOptions().backend) words.insert(words.end(), {"--backend", options.backend});
   if (options.gpu_device) words.insert(words.end(), {"--gpu-device", *options.gpu_device});
@@ -269,10 +269,10 @@ void add_measure_command(CLI::App& app, GlobalOptions& globals, const std::strin
       ->check(one_of({"ours", "reference"}))
       ->type_name("NAME");
   verb.add_option("--backend", options->backend,
-                  "Ray tracer of the packed files' pictures: packed, or gpu with the same hits (default packed)")
-      ->check(one_of({"packed", "gpu"}));
+                  "Ray tracer of the packed files' pictures: packed, gpu with the same hits, or gpu-rt (default packed)")
+      ->check(one_of({"packed", "gpu", "gpu-rt"}));
   verb.add_option("--gpu-device", options->gpu_device,
-                  "Part of the name of the Vulkan device to use, as of render; requires --backend gpu")
+                  "Part of the name of the Vulkan device to use, as of render; requires --backend gpu or gpu-rt")
       ->type_name("NAME");
   verb.add_option(
           "--max-error", options->max_error,

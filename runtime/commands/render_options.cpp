@@ -51,19 +51,19 @@ void add_frame_options(CLI::App& verb, RenderOptions& options) {
                 "Takes minutes");
 }
 
+/// The name of the backend.
 /// @param baked whether the input is a .ptk file
-Backend choose_backend(const RenderOptions& options, bool baked) {
+std::string choose_backend(const RenderOptions& options, bool baked) {
   const bool needs_embree = options.bvh || options.fast_edges;
-  if (options.gpu_device && options.backend.value_or("gpu") != "gpu")
-    throw Error(ErrorKind::kUsage, "--gpu-device requires --backend gpu");
+  if (options.gpu_device && !options.backend.value_or("gpu").starts_with("gpu"))
+    throw Error(ErrorKind::kUsage, "--gpu-device requires --backend gpu or gpu-rt");
   if (options.gpu_device && needs_embree)
     throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree, --gpu-device requires gpu");
-  if (options.gpu_device) return Backend::kGpu;
-  if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
-  const std::string& name = *options.backend; // the option's check accepts only known names
-  if (name == "embree") return Backend::kEmbree;
-  if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
-  return name == "gpu" ? Backend::kGpu : Backend::kPacked;
+  if (!options.backend && options.gpu_device) return "gpu";
+  if (!options.backend) return baked && !needs_embree ? "packed" : "embree";
+  if (*options.backend != "embree" && needs_embree)
+    throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
+  return *options.backend;
 }
 
 } // namespace
@@ -104,14 +104,14 @@ void add_tracer_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option(
           "--backend", options.backend,
           "Ray tracer to use. packed traces the compressed clusters (default for .ptk files); gpu does the same on a "
-          "GPU "
-          "with Vulkan and finds the same hits; embree traces floats (default for .pbrt scenes, and with --bvh or "
-          "--fast-edges)")
-      ->check(one_of({"packed", "gpu", "embree"}));
+          "GPU with Vulkan and finds the same hits; gpu-rt lets the GPU's driver trace decoded triangles in its own "
+          "acceleration structures, which take about ten times the memory; embree traces floats (default for .pbrt "
+          "scenes, and with --bvh or --fast-edges)")
+      ->check(one_of({"packed", "gpu", "gpu-rt", "embree"}));
   verb.add_option(
           "--gpu-device", options.gpu_device,
-          "Part of the name of the Vulkan device to use, in any case; selects --backend gpu (default: a "
-          "discrete GPU, else another GPU). Devices that run on the CPU, such as llvmpipe, are used by name only")
+          "Part of the name of the Vulkan device to use, in any case; selects --backend gpu unless gpu-rt is chosen "
+          "(default: a discrete GPU, else another GPU). Devices that run on the CPU, such as llvmpipe, are used by name only")
       ->type_name("NAME");
   verb.add_option(
           "--bvh,--bvh-quality", options.bvh,
@@ -207,7 +207,7 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
 
 TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& globals, bool baked) {
   TracerConfig config;
-  config.backend = choose_backend(options, baked);
+  set_backend(config, choose_backend(options, baked)); // the option's check accepts only known names
   const std::string quality = options.bvh.value_or("medium");
   config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false, true,
                    globals.memory};

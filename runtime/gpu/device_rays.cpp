@@ -170,7 +170,7 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   s.make_room(s.hits, pixels * sizeof(packed::KernelHit), "hits");
   s.make_room(s.rays, keep_rays ? pixels * sizeof(packed::KernelRay) : 1, "rays");
   s.cameras = upload(s.device, push_bytes(camera), "the camera");
-  if (!s.camera_kernel) s.camera_kernel = s.scene.make_kernel(spirv::camera(), kFirstBinding + 3, sizeof(SpanRecord));
+  if (!s.camera_kernel) s.camera_kernel = s.scene.make_ray_kernel({spirv::camera(), spirv::camera_rays()}, kFirstBinding + 3, sizeof(SpanRecord));
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
   return s.run_pixels(*s.camera_kernel, buffers, camera.width, camera.height, baked::kVisibleToCamera, keep_rays, {});
 }
@@ -208,7 +208,7 @@ std::shared_ptr<DeviceView> DeviceRays::trace_view(const ViewRecord& view, std::
   s.view.write(commands, push_bytes(view));
   s.film.write(commands, std::as_bytes(film));
   s.device->run(commands);
-  if (!s.view_kernel) s.view_kernel = s.scene.make_kernel(spirv::view(), kFirstBinding + 3, sizeof(SpanRecord));
+  if (!s.view_kernel) s.view_kernel = s.scene.make_ray_kernel({spirv::view(), spirv::view_rays()}, kFirstBinding + 3, sizeof(SpanRecord));
   const StagedBuffer& hits = reused->hits_buffer();
   const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &hits.device()};
   s.run_pixels(*s.view_kernel, buffers, view.width, view.height, ray_class, false, watch);
@@ -238,13 +238,15 @@ void DeviceRays::release() { state_->points = StagedBuffer(), state_->counts = B
 
 bool DeviceRays::can_count() const {
   const uint32_t lanes = state_->device->traits().subgroup_size;
+  if (state_->scene.structures) return true;
   return lanes >= kMinLanes && lanes <= kMaxLanes && state_->scene.node_count <= kMaxQueueNodes;
 }
 
 void DeviceRays::State::make_queue_kernel() {
+  const std::span<const uint32_t> compute =
+      device->traits().partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue();
   queue_kernel =
-      scene.make_kernel(device->traits().partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue(),
-                        kFirstBinding + 2, sizeof(OcclusionRecord));
+      scene.make_ray_kernel({compute, spirv::occlusion_count_rays()}, kFirstBinding + 2, sizeof(OcclusionRecord));
 }
 
 /// Runs a kernel for all points, and for at most `most_samples` of their samples at a time.
@@ -300,7 +302,7 @@ DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& 
   s.make_room(s.sums, uint64_t{s.point_count} * 2 * sizeof(double), "sums");
   s.device->fill(s.sums, 0);
   if (!s.nearest_kernel)
-    s.nearest_kernel = s.scene.make_kernel(spirv::occlusion_nearest(), kFirstBinding + 2, sizeof(OcclusionRecord));
+    s.nearest_kernel = s.scene.make_ray_kernel({spirv::occlusion_nearest(), spirv::occlusion_nearest_rays()}, kFirstBinding + 2, sizeof(OcclusionRecord));
   s.nearest_kernel->bind(kFirstBinding, s.points.device());
   s.nearest_kernel->bind(kFirstBinding + 1, s.sums);
   return s.run_all(

@@ -11,6 +11,12 @@ enum class GpuArithmetic : uint8_t {
   kExact,  ///< emulated by doubles: the same bits on every device
 };
 
+/// What rays traverse on a device.
+enum class GpuStructures : uint8_t {
+  kPacked, ///< the packed nodes and clusters of the file, with the CPU's hits
+  kDriver, ///< acceleration structures of the Vulkan driver over decoded triangles
+};
+
 /// Choice of a Vulkan device, and limits. The defaults are right for pictures; the rest serves tests.
 struct GpuConfig {
   /// Part of the device's name, in any case. Empty: a discrete GPU, else an integrated or virtual one, but never a
@@ -18,6 +24,7 @@ struct GpuConfig {
   std::string device;
   uint64_t memory_limit_bytes = 0; ///< device memory that may be allocated; 0: as much as the device has
   GpuArithmetic arithmetic = GpuArithmetic::kProbed;
+  GpuStructures structures = GpuStructures::kPacked;
   double dispatch_ms = 50.0;             ///< time that a dispatch should take at most; work is split accordingly
   bool validation = false;               ///< Vulkan's validation layer, where it is installed
   std::string loader = "libvulkan.so.1"; ///< shared library of the Vulkan loader

@@ -101,7 +101,7 @@ void GpuScene::State::upload_placements(const SceneTables& t) {
   ++placed;
 }
 
-void GpuScene::State::make_kernels(const SceneTables& t) {
+void GpuScene::State::set_constants(const SceneTables& t) {
   const auto any_tree = [&](uint32_t flags) {
     return std::ranges::any_of(t.trees, [&](const TreeRecord& tree) { return (tree.flags & flags) != 0; }) ? 1u : 0u;
   };
@@ -117,10 +117,14 @@ void GpuScene::State::make_kernels(const SceneTables& t) {
                t.exact_vertices.empty() ? 0u : 1u,
                traits.half_bytes ? 1u : 0u,
                std::max(4u, (kLeafCorners + traits.subgroup_size - 1) / traits.subgroup_size)};
-  auto new_closest = make_kernel(spirv::trace_closest(), kBindings, sizeof(SpanRecord));
-  any = make_kernel(spirv::trace_any(), kBindings, sizeof(SpanRecord));
-  closest = std::move(new_closest);
   top_levels = levels, many_placements = !t.top_nodes.empty();
+}
+
+void GpuScene::State::make_kernels() {
+  auto new_closest =
+      make_ray_kernel({spirv::trace_closest(), spirv::trace_closest_rays()}, kBindings, sizeof(SpanRecord));
+  any = make_ray_kernel({spirv::trace_any(), spirv::trace_any_rays()}, kBindings, sizeof(SpanRecord));
+  closest = std::move(new_closest);
 }
 
 std::unique_ptr<Kernel> GpuScene::State::make_kernel(std::span<const uint32_t> spirv, uint32_t bindings,
@@ -130,9 +134,20 @@ std::unique_ptr<Kernel> GpuScene::State::make_kernel(std::span<const uint32_t> s
   return kernel;
 }
 
+std::unique_ptr<Kernel> GpuScene::State::make_ray_kernel(const RayKernelCode& code, uint32_t bindings,
+                                                         size_t push_bytes) const {
+  if (!structures) return make_kernel(code.compute, bindings, push_bytes);
+  const HitShaders hits{spirv::closest_hit(), spirv::any_hit(), spirv::miss()};
+  auto kernel =
+      std::make_unique<Kernel>(device, code.rays, hits, constants, bindings, static_cast<uint32_t>(push_bytes));
+  bind_scene(*kernel);
+  return kernel;
+}
+
 void GpuScene::State::bind_scene(Kernel& kernel) const {
   const auto all = scene_buffers();
   for (uint32_t i = 0; i < kSceneBindings; ++i) kernel.bind(i, *all[i]);
+  if (kernel.traces_structures()) structures->bind(kernel);
 }
 
 /// Fills in what the queue kernel reads of leaf nodes.
@@ -192,17 +207,40 @@ GpuScene::GpuScene(const GpuConfig& config, const SceneTables& tables) : state_(
   state_->device = Device::share(config);
   state_->exact = config.arithmetic == GpuArithmetic::kExact || !state_->device->traits().fused_floats;
   state_->upload_all(tables);
-  state_->make_kernels(tables);
+  state_->set_constants(tables);
+  if (config.structures == GpuStructures::kDriver) return; // use_structures() and place_structures() do the rest
+  state_->make_kernels();
   state_->prepare_nodes(tables.nodes.size());
 }
 
 GpuScene::~GpuScene() = default;
 
+void GpuScene::use_structures(std::shared_ptr<StructureMemory> memory, std::span<const RangeRecord> ranges) {
+  state_->structures = std::make_unique<RayStructures>(*this, std::move(memory), ranges);
+}
+
+RayStructures* GpuScene::structures() const { return state_->structures.get(); }
+
+double GpuScene::place_structures(std::span<const packed::TracePlacement> placements,
+                                  std::span<const BottomLevel> levels, std::span<const uint64_t> structures) const {
+  const std::lock_guard lock(state_->mutex);
+  const double ms = state_->structures->place(placements, levels, structures);
+  if (state_->closest)
+    for (Kernel* kernel : {state_->closest.get(), state_->any.get()}) state_->bind_scene(*kernel);
+  else
+    state_->make_kernels();
+  ++state_->placed;
+  return ms;
+}
+
 void GpuScene::replace_placements(const SceneTables& tables) {
   const std::lock_guard lock(state_->mutex);
   state_->upload_placements(tables);
-  if (levels_of(tables.top_nodes) > state_->top_levels || tables.top_nodes.empty() == state_->many_placements)
-    state_->make_kernels(tables);
+  if (state_->structures) return; // place_structures() follows
+  if (levels_of(tables.top_nodes) > state_->top_levels || tables.top_nodes.empty() == state_->many_placements) {
+    state_->set_constants(tables);
+    state_->make_kernels();
+  }
 }
 
 void GpuScene::closest(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<packed::KernelHit> hits,
@@ -236,6 +274,7 @@ uint64_t GpuScene::bytes() const {
   const State& s = *state_;
   uint64_t bytes = s.rays.bytes() + s.results.bytes();
   for (const Buffer* buffer : s.scene_buffers()) bytes += buffer->bytes();
+  if (s.structures) bytes += s.structures->bytes();
   return bytes;
 }
 

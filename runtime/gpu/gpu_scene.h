@@ -13,6 +13,8 @@
 namespace packtrace::gpu {
 
 class Device;
+class RayStructures;
+class StructureMemory;
 
 /// A scene's tables as they are uploaded. Needed only while they are.
 struct SceneTables {
@@ -29,13 +31,25 @@ struct SceneTables {
   uint32_t tree_levels = 0; ///< of the deepest tree
 };
 
+struct BottomLevel;
+
 /// A scene on a device. Hits are those of the CPU's packed kernels, bit for bit, where DeviceTraits::fused_floats or
-/// the exact arithmetic holds. All const functions may be called from several threads; they take turns.
+/// the exact arithmetic holds; with GpuStructures::kDriver they are those that the driver finds. All const functions may
+/// be called from several threads; they take turns.
 class GpuScene {
 public:
   /// Opens a device and uploads the scene. Throws as Device::open() and Buffer do.
   GpuScene(const GpuConfig& config, const SceneTables& tables);
   ~GpuScene();
+
+  /// Prepares a scene with GpuStructures::kDriver, which traces nothing before place_structures() was called.
+  /// @param ranges as RayStructures'
+  void use_structures(std::shared_ptr<StructureMemory> memory, std::span<const RangeRecord> ranges);
+  /// Null without use_structures().
+  RayStructures* structures() const;
+  /// Traces these structures from now on; see RayStructures::place(). Returns the time of the build in ms.
+  double place_structures(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
+                          std::span<const uint64_t> structures) const;
 
   /// Uploads the placements that changed, and the nodes of the tree over them that did.
   void replace_placements(const SceneTables& tables);

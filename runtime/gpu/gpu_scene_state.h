@@ -11,10 +11,16 @@
 #include "runtime/gpu/device/kernel.h"
 #include "runtime/gpu/device/staged_buffer.h"
 #include "runtime/gpu/gpu_scene.h"
+#include "runtime/gpu/structures/ray_structures.h"
 
 namespace packtrace::gpu {
 
 inline constexpr uint32_t kSceneBindings = 9; ///< buffers of a scene, bound to 0, 1, ...
+
+/// A kernel that traces rays: compute, and as ray generation shader.
+struct RayKernelCode {
+  std::span<const uint32_t> compute, rays;
+};
 
 /// What a scene has on its device.
 struct GpuScene::State {
@@ -23,6 +29,7 @@ struct GpuScene::State {
   Buffer nodes, clusters, payload, trees, exact_vertices, masks;
   StagedBuffer placements, top_nodes, scene;
   std::vector<std::byte> placed_materials; ///< the words of `masks` that belong to placements
+  std::unique_ptr<RayStructures> structures; ///< null unless the driver traverses
   std::unique_ptr<Kernel> closest, any;
   std::vector<uint32_t> constants; ///< of all kernels: scene.glsl
   uint32_t top_levels = 0;         ///< that the kernels have room for
@@ -40,10 +47,13 @@ struct GpuScene::State {
   void upload_placements(const SceneTables& t);
   bool replace_buffers(const SceneTables& t);
   void upload_materials(const SceneTables& t);
-  void make_kernels(const SceneTables& t);
+  void set_constants(const SceneTables& t);
+  void make_kernels();
   void prepare_nodes(size_t count);
   /// A kernel that reads the scene, with its buffers bound.
   std::unique_ptr<Kernel> make_kernel(std::span<const uint32_t> spirv, uint32_t bindings, size_t push_bytes) const;
+  /// The same of a kernel that traces rays.
+  std::unique_ptr<Kernel> make_ray_kernel(const RayKernelCode& code, uint32_t bindings, size_t push_bytes) const;
   void bind_scene(Kernel& kernel) const;
   std::array<const Buffer*, kSceneBindings> scene_buffers() const {
     return {&nodes, &clusters,       &payload, &placements.device(), &top_nodes.device(),

@@ -48,13 +48,6 @@ Camera chosen_camera(const SceneSource& source, std::optional<int64_t> index, Im
   return source.cameras()[static_cast<size_t>(*index)];
 }
 
-Backend chosen_backend(const std::string& name) {
-  if (name == "packed") return Backend::kPacked;
-  if (name == "gpu") return Backend::kGpu;
-  if (name == "embree") return Backend::kEmbree;
-  throw Error(ErrorKind::kUsage, "backend=\"" + name + "\": choose one of packed, gpu, embree");
-}
-
 /// What render() is told of the denoiser.
 struct DenoiserChoice {
   bool denoise = true;
@@ -164,7 +157,8 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     set_shading(config, view, shade_settings);
     config.validate();
     TracerConfig tracing;
-    tracing.backend = chosen_backend(backend);
+    if (!set_backend(tracing, backend))
+      throw Error(ErrorKind::kUsage, "backend=\"" + backend + "\": choose one of packed, gpu, gpu-rt, embree");
     FrameLoop loop({&source, file.get(), tracing}, config);
     Progress progress;
     render_still(loop, camera, 0.0, config.frames, false, image, progress);

@@ -17,13 +17,34 @@ std::unique_ptr<RayTracer> make_gpu_tracer([[maybe_unused]] const Source& source
                                            [[maybe_unused]] const BakedFile& file,
                                            [[maybe_unused]] const TracerConfig& config) {
 #if defined(PACKTRACE_HAS_GPU)
-  return std::make_unique<GpuTracer>(file, source, config.gpu, config.movers);
+  return std::make_unique<GpuTracer>(file, source, config.gpu, config.movers, config.structures);
 #else
   throw Error(ErrorKind::kUnsupported, "packtrace was built without backend gpu; use --backend packed");
 #endif
 }
 
 } // namespace
+
+bool set_backend(TracerConfig& config, std::string_view name) {
+  if (name == "embree")
+    config.backend = Backend::kEmbree;
+  else if (name == "packed")
+    config.backend = Backend::kPacked;
+  else if (name == "gpu" || name == "gpu-rt")
+    config.backend = Backend::kGpu;
+  else
+    return false;
+  config.gpu.structures = name == "gpu-rt" ? GpuStructures::kDriver : GpuStructures::kPacked;
+  return true;
+}
+
+std::shared_ptr<StructureCache> make_structure_cache([[maybe_unused]] const TracerConfig& config) {
+#if defined(PACKTRACE_HAS_GPU)
+  if (config.backend == Backend::kGpu && config.gpu.structures == GpuStructures::kDriver)
+    return std::make_shared<StructureCache>(config.gpu);
+#endif
+  return nullptr;
+}
 
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config) {
   if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree, config.movers);

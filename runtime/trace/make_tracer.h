@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string_view>
 
 #include "runtime/gpu/gpu_config.h"
 #include "runtime/trace/embree/embree_tracer.h"
@@ -10,6 +11,7 @@ namespace packtrace {
 
 class BakedFile;
 class LodSource;
+class StructureCache;
 
 enum class Backend : uint8_t {
   kEmbree, ///< Embree over triangles decoded to floats
@@ -22,7 +24,17 @@ struct TracerConfig {
   EmbreeConfig embree;
   Movers movers = {}; ///< instances that RayTracer::place_instances() may move
   GpuConfig gpu = {}; ///< of backend gpu
+  /// With GpuStructures::kDriver: the structures that all tracers of the scene share; null: each has its own.
+  std::shared_ptr<StructureCache> structures;
 };
+
+/// Chooses a backend by its name: embree, packed, gpu, or gpu-rt, which is gpu with GpuStructures::kDriver. Returns false
+/// for other names.
+bool set_backend(TracerConfig& config, std::string_view name);
+
+/// What tracers of a scene with this config should share as TracerConfig::structures; null if they share nothing.
+/// Throws as StructureCache's constructor does.
+std::shared_ptr<StructureCache> make_structure_cache(const TracerConfig& config);
 
 /// Creates a tracer; the only function that knows all backends. Keeps references: source and file must outlive the
 /// tracer.

@@ -29,6 +29,10 @@ Buffer::Buffer(std::shared_ptr<Device> device, uint64_t bytes, BufferPlace place
   info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
   info.size = bytes_;
   info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  if (device_->config().structures == GpuStructures::kDriver)
+    info.usage |= VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT | VK_BUFFER_USAGE_SHADER_BINDING_TABLE_BIT_KHR |
+                  VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR |
+                  VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR;
   check(vkCreateBuffer(device_->handle(), &info, nullptr, &buffer_), "vkCreateBuffer");
   try {
     allocate(place, what);
@@ -51,7 +55,10 @@ void Buffer::allocate(BufferPlace place, const char* what) {
                                                " are in use; use --backend packed, or a smaller picture");
   };
   if (used > there || needed.size > there - used) throw_full();
-  const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, nullptr, needed.size,
+  const bool has_address = device_->config().structures == GpuStructures::kDriver;
+  const VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO, nullptr,
+                                        VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT, 0};
+  const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, has_address ? &flags : nullptr, needed.size,
                                   device_->memory_type(needed.memoryTypeBits, place == BufferPlace::kHost)};
   const VkResult result = vkAllocateMemory(device_->handle(), &info, nullptr, &memory_);
   if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY) throw_full();
@@ -63,6 +70,11 @@ void Buffer::allocate(BufferPlace place, const char* what) {
   void* mapped = nullptr;
   check(vkMapMemory(device_->handle(), memory_, 0, VK_WHOLE_SIZE, 0, &mapped), "vkMapMemory");
   mapped_ = static_cast<std::byte*>(mapped);
+}
+
+uint64_t Buffer::address() const {
+  const VkBufferDeviceAddressInfo info{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr, buffer_};
+  return vkGetBufferDeviceAddress(device_->handle(), &info);
 }
 
 Buffer::~Buffer() {

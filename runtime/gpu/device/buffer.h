@@ -30,6 +30,8 @@ public:
 
   VkBuffer handle() const { return buffer_; }
   uint64_t bytes() const { return bytes_; }
+  /// Address for kernels and builds. Only on devices with GpuStructures::kDriver.
+  uint64_t address() const;
   /// kHost only.
   std::byte* data() const { return mapped_; }
   template <typename T>

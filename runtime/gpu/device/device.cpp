@@ -72,15 +72,10 @@ double Device::submit(const Record& record, std::span<double> times) {
 }
 
 double Device::run(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups) {
-  return submit([&](VkCommandBuffer commands) {
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline_);
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout_, 0, 1, &kernel.set_, 0, nullptr);
-    if (!push.empty())
-      vkCmdPushConstants(commands, kernel.layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, static_cast<uint32_t>(push.size()),
-                         push.data());
-    vkCmdDispatch(commands, groups, 1, 1);
-  });
+  return submit([&](VkCommandBuffer commands) { kernel.record(commands, push, groups, 1); });
 }
+
+double Device::run(const std::function<void(VkCommandBuffer)>& record) { return submit(record); }
 
 /// Records commands with a barrier before each dispatch, and before the first copy behind dispatches.
 void Device::record(const Commands& commands) {
@@ -104,13 +99,8 @@ void Device::record(const Commands& commands) {
       const VkBufferCopy region{step.offset, step.offset, step.bytes};
       vkCmdCopyBuffer(commands_, step.from, step.to, 1, &region);
     } else {
-      const Kernel& kernel = *step.kernel;
-      vkCmdBindPipeline(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline_);
-      vkCmdBindDescriptorSets(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout_, 0, 1, &kernel.set_, 0,
-                              nullptr);
-      vkCmdPushConstants(commands_, kernel.layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, step.push_bytes, step.push.data());
       write_stamp(VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT); // once the work before has ended
-      vkCmdDispatch(commands_, step.groups_x, step.groups_y, 1);
+      step.kernel->record(commands_, std::span(step.push).first(step.push_bytes), step.groups_x, step.groups_y);
       write_stamp(VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT);
     }
   }

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -37,6 +38,13 @@ struct DeviceTraits {
   bool partitioned = false;   ///< VK_NV_shader_subgroup_partitioned
 };
 
+/// Limits of acceleration structures and ray tracing pipelines; zero unless GpuConfig::structures is kDriver.
+struct StructureLimits {
+  uint32_t group_handle_bytes = 0, group_base_alignment = 0; ///< of shader groups
+  uint32_t scratch_alignment = 0;
+  uint64_t max_primitives = 0, max_instances = 0; ///< of a structure
+};
+
 /// An open Vulkan device with one compute queue. All functions may be called from several threads.
 class Device {
 public:
@@ -55,6 +63,7 @@ public:
   bool on_cpu() const { return properties_.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU; }
   const VkPhysicalDeviceLimits& limits() const { return properties_.limits; }
   const DeviceTraits& traits() const { return traits_; }
+  const StructureLimits& structure_limits() const { return structure_limits_; }
   VkDevice handle() const { return device_; }
 
   /// Runs a kernel and waits. Returns its time in ms.
@@ -64,6 +73,8 @@ public:
   /// Runs commands and waits. Returns the time of each dispatch in ms; nothing on devices without timestamps and on CPU
   /// devices. Throws DeviceLost.
   std::vector<double> run(const Commands& commands);
+  /// Records commands by a function, runs them and waits. Returns their time in ms. Throws DeviceLost.
+  double run(const std::function<void(VkCommandBuffer)>& record);
   /// Copies bytes between buffers and waits. Returns the time in ms.
   double copy(const Buffer& from, const Buffer& to, uint64_t from_offset, uint64_t to_offset, uint64_t bytes);
   /// Sets all words of a buffer and waits.
@@ -108,6 +119,7 @@ private:
   VkQueryPool queries_ = VK_NULL_HANDLE;
   uint64_t stamp_mask_ = ~uint64_t{0}; ///< valid bits of timestamps
   DeviceTraits traits_;
+  StructureLimits structure_limits_;
   std::mutex queue_mutex_;
   std::atomic<uint64_t> allocated_ = 0;
   std::atomic<bool> lost_ = false;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstring>
 #include <mutex>
@@ -59,6 +60,56 @@ VkPhysicalDeviceSubgroupProperties subgroups_of(VkPhysicalDevice device) {
   return subgroups;
 }
 
+constexpr std::array kStructureExtensions = {VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
+                                             VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME,
+                                             VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME};
+
+/// The features of acceleration structures and ray tracing pipelines, chained for the driver.
+struct StructureFeatures {
+  StructureFeatures() {
+    addresses.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES;
+    structures.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR;
+    pipelines.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR;
+    addresses.pNext = &structures, structures.pNext = &pipelines;
+  }
+  StructureFeatures(const StructureFeatures&) = delete;
+
+  void require() {
+    addresses.bufferDeviceAddress = VK_TRUE, structures.accelerationStructure = VK_TRUE;
+    pipelines.rayTracingPipeline = VK_TRUE;
+  }
+  bool there() const {
+    return addresses.bufferDeviceAddress == VK_TRUE && structures.accelerationStructure == VK_TRUE &&
+           pipelines.rayTracingPipeline == VK_TRUE;
+  }
+
+  VkPhysicalDeviceBufferDeviceAddressFeatures addresses{};
+  VkPhysicalDeviceAccelerationStructureFeaturesKHR structures{};
+  VkPhysicalDeviceRayTracingPipelineFeaturesKHR pipelines{};
+};
+
+bool has_structures(VkPhysicalDevice device) {
+  for (const char* const extension : kStructureExtensions)
+    if (!has_extension(device, extension)) return false;
+  StructureFeatures features;
+  VkPhysicalDeviceFeatures2 all{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &features.addresses, {}};
+  vkGetPhysicalDeviceFeatures2(device, &all);
+  return features.there();
+}
+
+StructureLimits structure_limits_of(VkPhysicalDevice device) {
+  VkPhysicalDeviceAccelerationStructurePropertiesKHR structures{};
+  structures.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR;
+  VkPhysicalDeviceRayTracingPipelinePropertiesKHR pipelines{};
+  pipelines.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_PROPERTIES_KHR;
+  pipelines.pNext = &structures;
+  VkPhysicalDeviceProperties2 more{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &pipelines, {}};
+  vkGetPhysicalDeviceProperties2(device, &more);
+  return {pipelines.shaderGroupHandleSize, pipelines.shaderGroupBaseAlignment,
+          structures.minAccelerationStructureScratchOffsetAlignment, structures.maxPrimitiveCount,
+          structures.maxInstanceCount};
+}
+
 DeviceFeatures features_of(VkPhysicalDevice device) {
   const VkPhysicalDeviceProperties properties = properties_of(device);
   DeviceFeatures out;
@@ -71,6 +122,7 @@ DeviceFeatures features_of(VkPhysicalDevice device) {
   out.subgroups = subgroups_of(device).supportedOperations;
   out.storage_buffers = properties.limits.maxPerStageDescriptorStorageBuffers;
   out.computes = compute_family(device, families) < families.size();
+  out.structures = has_structures(device);
   return out;
 }
 
@@ -162,7 +214,7 @@ void Device::choose_device() {
     if (!wanted.empty() && lower_case(properties.deviceName).find(wanted) == std::string::npos) continue;
     const int value = rank(properties.deviceType);
     if (wanted.empty() && value == 0) continue;
-    if (const std::string missing = missing_features(features_of(device)); !missing.empty()) {
+    if (const std::string missing = missing_features(features_of(device), config_.structures); !missing.empty()) {
       lacking += (lacking.empty() ? "" : "; ") + std::string(properties.deviceName) + " lacks " + missing;
       continue;
     }
@@ -194,10 +246,19 @@ void Device::create_device() {
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
   info.pEnabledFeatures = &features;
-  const char* const partitioned = VK_NV_SHADER_SUBGROUP_PARTITIONED_EXTENSION_NAME;
-  traits_.partitioned = has_extension(physical_, partitioned);
-  if (traits_.partitioned) info.enabledExtensionCount = 1, info.ppEnabledExtensionNames = &partitioned;
+  std::vector<const char*> extensions;
+  traits_.partitioned = has_extension(physical_, VK_NV_SHADER_SUBGROUP_PARTITIONED_EXTENSION_NAME);
+  if (traits_.partitioned) extensions.push_back(VK_NV_SHADER_SUBGROUP_PARTITIONED_EXTENSION_NAME);
+  StructureFeatures structures;
+  if (config_.structures == GpuStructures::kDriver) {
+    extensions.insert(extensions.end(), kStructureExtensions.begin(), kStructureExtensions.end());
+    structures.require();
+    info.pNext = &structures.addresses;
+  }
+  info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   check(vkCreateDevice(physical_, &info, nullptr, &device_), "vkCreateDevice");
+  if (config_.structures == GpuStructures::kDriver) structure_limits_ = structure_limits_of(physical_);
   vkGetDeviceQueue(device_, family_, 0, &queue_);
   const VkCommandPoolCreateInfo pool{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0, family_};
   check(vkCreateCommandPool(device_, &pool, nullptr, &pool_), "vkCreateCommandPool");
@@ -264,7 +325,7 @@ std::vector<std::string> device_names(const GpuConfig& config) {
   volkLoadInstance(instance);
   std::vector<std::string> names;
   for (const VkPhysicalDevice device : physical_devices(instance)) {
-    const std::string missing = missing_features(features_of(device));
+    const std::string missing = missing_features(features_of(device), config.structures);
     names.push_back(properties_of(device).deviceName + (missing.empty() ? std::string() : " (lacks " + missing + ")"));
   }
   vkDestroyInstance(instance, nullptr);

@@ -2,7 +2,7 @@
 
 namespace packtrace::gpu {
 
-std::string missing_features(const DeviceFeatures& device) {
+std::string missing_features(const DeviceFeatures& device, GpuStructures structures) {
   constexpr uint32_t kStorageBuffers = 16;
   constexpr VkSubgroupFeatureFlags kOperations = VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_VOTE_BIT |
                                                  VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT |
@@ -17,6 +17,7 @@ std::string missing_features(const DeviceFeatures& device) {
   need((device.subgroups & kOperations) == kOperations, "subgroup ballot, shuffle and arithmetic");
   need(device.storage_buffers >= kStorageBuffers, "16 storage buffers per kernel");
   need(device.computes, "a compute queue");
+  need(structures == GpuStructures::kPacked || device.structures, "acceleration structures and ray tracing pipelines");
   return missing;
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "runtime/gpu/device/vulkan_api.h"
+#include "runtime/gpu/gpu_config.h"
 
 namespace packtrace::gpu {
 
@@ -13,9 +14,10 @@ struct DeviceFeatures {
   VkSubgroupFeatureFlags subgroups = 0;
   uint32_t storage_buffers = 0; ///< of a kernel
   bool computes = false;        ///< has a compute queue
+  bool structures = false;      ///< has acceleration structures and ray tracing pipelines
 };
 
-/// Names what is missing; empty if nothing.
-std::string missing_features(const DeviceFeatures& device);
+/// Names what is missing for rays through `structures`; empty if nothing.
+std::string missing_features(const DeviceFeatures& device, GpuStructures structures);
 
 } // namespace packtrace::gpu

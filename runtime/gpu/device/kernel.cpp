@@ -10,26 +10,29 @@ namespace packtrace::gpu {
 Kernel::Kernel(std::shared_ptr<Device> device, std::span<const uint32_t> spirv, std::span<const uint32_t> constants,
                uint32_t bindings, uint32_t push_bytes)
     : Kernel(std::move(device)) { // from here on the destructor runs, whatever is thrown
-  create_layout(bindings, push_bytes);
+  std::vector<VkDescriptorSetLayoutBinding> buffers;
+  for (uint32_t i = 0; i < bindings; ++i)
+    buffers.push_back({i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+  create_layout(buffers, push_bytes);
   create_pipeline(spirv, constants);
 }
 
 Kernel::Kernel(std::shared_ptr<Device> device) : device_(std::move(device)) {}
 
-void Kernel::create_layout(uint32_t bindings, uint32_t push_bytes) {
+void Kernel::create_layout(std::span<const VkDescriptorSetLayoutBinding> bindings, uint32_t push_bytes) {
   const VkDevice device = device_->handle();
-  std::vector<VkDescriptorSetLayoutBinding> buffers;
-  for (uint32_t i = 0; i < bindings; ++i)
-    buffers.push_back({i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
-  const VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO, nullptr, 0, bindings,
-                                            buffers.data()};
+  const auto count = static_cast<uint32_t>(bindings.size());
+  const VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO, nullptr, 0, count,
+                                            bindings.data()};
   check(vkCreateDescriptorSetLayout(device, &set, nullptr, &set_layout_), "vkCreateDescriptorSetLayout");
-  const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
+  const VkPushConstantRange push{push_stages_, 0, push_bytes};
   const VkPipelineLayoutCreateInfo layout{
       VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO, nullptr, 0, 1, &set_layout_, push_bytes > 0 ? 1u : 0u, &push};
   check(vkCreatePipelineLayout(device, &layout, nullptr, &layout_), "vkCreatePipelineLayout");
-  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, bindings};
-  const VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr, 0, 1, 1, &size};
+  const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, count},
+                                        {VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR, 1}};
+  const VkDescriptorPoolCreateInfo pool{
+      VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr, 0, 1, traces_ ? 2u : 1u, sizes};
   check(vkCreateDescriptorPool(device, &pool, nullptr, &pool_), "vkCreateDescriptorPool");
   const VkDescriptorSetAllocateInfo allocate{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, nullptr, pool_, 1,
                                              &set_layout_};
@@ -60,6 +63,24 @@ void Kernel::create_pipeline(std::span<const uint32_t> spirv, std::span<const ui
   const VkResult result = vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_);
   vkDestroyShaderModule(device, module, nullptr);
   check(result, "vkCreateComputePipelines");
+}
+
+void Kernel::record(VkCommandBuffer commands, std::span<const std::byte> push, uint32_t groups_x,
+                    uint32_t groups_y) const {
+  const VkPipelineBindPoint point = traces_ ? VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR : VK_PIPELINE_BIND_POINT_COMPUTE;
+  vkCmdBindPipeline(commands, point, pipeline_);
+  vkCmdBindDescriptorSets(commands, point, layout_, 0, 1, &set_, 0, nullptr);
+  if (!push.empty())
+    vkCmdPushConstants(commands, layout_, push_stages_, 0, static_cast<uint32_t>(push.size()), push.data());
+  if (!traces_) {
+    vkCmdDispatch(commands, groups_x, groups_y, 1);
+    return;
+  }
+  const uint64_t table = shader_table_->address();
+  const VkStridedDeviceAddressRegionKHR generation{table, table_stride_, table_stride_},
+      miss{table + table_stride_, table_stride_, table_stride_}, hit{table + 2 * table_stride_, table_stride_, table_stride_},
+      none{};
+  vkCmdTraceRaysKHR(commands, &generation, &miss, &hit, &none, groups_x * kGroupThreads, groups_y, 1);
 }
 
 void Kernel::bind(uint32_t binding, const Buffer& buffer) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,27 +11,52 @@ namespace packtrace::gpu {
 
 class Buffer;
 
-/// A compute pipeline and the buffers that it reads and writes.
+/// The shaders of a ray tracing pipeline besides its ray generation shader. Each is SPIR-V, validated at build time.
+struct HitShaders {
+  std::span<const uint32_t> closest, any, miss;
+};
+
+/// A compute or ray tracing pipeline and the buffers that it reads and writes.
 class Kernel {
 public:
+  static constexpr uint32_t kGroupThreads = 64; ///< of a group of a ray tracing pipeline
+  /// Bindings of ray tracing pipelines: two storage buffers that hit shaders read, and the acceleration structure.
+  static constexpr uint32_t kRangesBinding = 12, kInstancesBinding = 13, kStructureBinding = 14;
+
   /// @param spirv module that was validated at build time
   /// @param constants values of the specialization constants 0, 1, ...
   /// @param bindings number of storage buffers, bound to 0, 1, ...
   Kernel(std::shared_ptr<Device> device, std::span<const uint32_t> spirv, std::span<const uint32_t> constants,
          uint32_t bindings, uint32_t push_bytes);
+  /// A ray tracing pipeline: a group of Device::run() is kGroupThreads rays. Only on devices with
+  /// GpuStructures::kDriver.
+  /// @param spirv ray generation shader
+  /// @param constants of all shaders
+  /// @param bindings number of storage buffers, bound to 0, 1, ...; at most kRangesBinding
+  Kernel(std::shared_ptr<Device> device, std::span<const uint32_t> spirv, const HitShaders& hit_shaders,
+         std::span<const uint32_t> constants, uint32_t bindings, uint32_t push_bytes);
   ~Kernel();
   Kernel(const Kernel&) = delete;
   Kernel& operator=(const Kernel&) = delete;
 
   /// Binds a buffer, which must outlive the runs of this kernel.
   void bind(uint32_t binding, const Buffer& buffer);
+  /// Whether it is a ray tracing pipeline.
+  bool traces_structures() const { return traces_; }
+  /// Binds the acceleration structure of a ray tracing pipeline.
+  void bind(VkAccelerationStructureKHR structure);
+
+  /// Records the start of all groups, for commands of the caller.
+  void record(VkCommandBuffer commands, std::span<const std::byte> push, uint32_t groups_x, uint32_t groups_y) const;
 
 private:
-  friend class Device;
 
   explicit Kernel(std::shared_ptr<Device> device);
-  void create_layout(uint32_t bindings, uint32_t push_bytes);
+  void create_layout(std::span<const VkDescriptorSetLayoutBinding> bindings, uint32_t push_bytes);
   void create_pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants);
+  void create_ray_pipeline(std::span<const uint32_t> spirv, const HitShaders& hit_shaders,
+                           std::span<const uint32_t> constants);
+  void create_shader_table();
 
   std::shared_ptr<Device> device_;
   VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
@@ -38,6 +64,11 @@ private:
   VkDescriptorSet set_ = VK_NULL_HANDLE;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline pipeline_ = VK_NULL_HANDLE;
+  VkShaderStageFlags push_stages_ = VK_SHADER_STAGE_COMPUTE_BIT;
+  // Of ray tracing pipelines:
+  bool traces_ = false;
+  std::unique_ptr<Buffer> shader_table_; ///< ray generation, miss and hit group
+  uint64_t table_stride_ = 0;
 };
 
 } // namespace packtrace::gpu

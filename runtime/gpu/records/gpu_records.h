@@ -36,6 +36,18 @@ struct TreeRecord {
   uint32_t reserved;
 };
 
+/// A cluster in the table that translates the triangles of an acceleration structure.
+struct RangeRecord {
+  uint32_t first_triangle; ///< of the geometry of the structure
+  uint32_t cluster;
+};
+
+/// A placed acceleration structure, by its number in the top level.
+struct InstanceRecord {
+  uint32_t placement;
+  uint32_t first_range[2], range_count[2]; ///< by geometry of the structure
+};
+
 /// What all rays of a scene need.
 struct SceneRecord {
   uint32_t placement_count; ///< the record of the tree over placements follows the last one

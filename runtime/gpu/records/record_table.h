@@ -89,6 +89,17 @@ inline constexpr std::array kTreeFields = {
     GlslField{"uint", "reserved", offsetof(TreeRecord, reserved)},
 };
 
+inline constexpr std::array kRangeFields = {
+    GlslField{"uint", "first_triangle", offsetof(RangeRecord, first_triangle)},
+    GlslField{"uint", "cluster", offsetof(RangeRecord, cluster)},
+};
+
+inline constexpr std::array kInstanceFields = {
+    GlslField{"uint", "placement", offsetof(InstanceRecord, placement)},
+    GlslField{"uint", "first_range", offsetof(InstanceRecord, first_range), 2},
+    GlslField{"uint", "range_count", offsetof(InstanceRecord, range_count), 2},
+};
+
 inline constexpr std::array kSceneFields = {
     GlslField{"uint", "placement_count", offsetof(SceneRecord, placement_count)},
     GlslField{"uint", "material_word", offsetof(SceneRecord, material_word)},
@@ -202,6 +213,8 @@ inline constexpr std::array kRecords = {
     GlslRecord{"HitRecord", sizeof(packed::KernelHit), kHitFields},
     GlslRecord{"ClusterRecord", sizeof(ClusterRecord), kClusterFields},
     GlslRecord{"TreeRecord", sizeof(TreeRecord), kTreeFields},
+    GlslRecord{"RangeRecord", sizeof(RangeRecord), kRangeFields},
+    GlslRecord{"InstanceRecord", sizeof(InstanceRecord), kInstanceFields},
     GlslRecord{"SceneRecord", sizeof(SceneRecord), kSceneFields},
     GlslRecord{"SpanRecord", sizeof(SpanRecord), kSpanFields},
     GlslRecord{"CameraRecord", sizeof(CameraRecord), kCameraFields},

@@ -2,16 +2,15 @@
 #extension GL_GOOGLE_include_directive : require
 // Makes camera rays and finds their nearest hits.
 #define CLOSEST
-#include "traversal.glsl"
+#include "trace.glsl"
 
-layout(local_size_x = 64) in;
 layout(std430, binding = 9) readonly restrict buffer Cameras { CameraRecord camera; };
 layout(std430, binding = 10) writeonly restrict buffer Hits { HitRecord hits[]; };
 layout(std430, binding = 11) writeonly restrict buffer Rays { RayRecord rays[]; };
 layout(push_constant) uniform Push { SpanRecord span; }; // of threads; ray_class; reserved: 1 writes rays
 
 void main() {
-  uint i = gl_GlobalInvocationID.x;
+  uint i = THREAD;
   if (i >= span.count) return;
   i += span.first;
   // Blocks of 8 x 4 pixels; those at the right and lower edge are not full.

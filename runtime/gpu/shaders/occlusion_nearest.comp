@@ -3,10 +3,9 @@
 // Sums the visibility and the distance of occlusion rays up, sample by sample: VisibilityCurve and add_samples(), the
 // same bits. Rays are made here; a thread has a point.
 #define CLOSEST
-#include "traversal.glsl"
+#include "trace.glsl"
 #include "points.glsl"
 
-layout(local_size_x = 64) in;
 layout(std430, binding = 10) restrict buffer Sums { double sums[]; }; // visibility, distance
 
 // e^x for x in [-80, 0]
@@ -41,7 +40,7 @@ float visibility(float x) {
 }
 
 void main() {
-  uint i = gl_GlobalInvocationID.x;
+  uint i = THREAD;
   if (i >= push.point_count) return;
   i += push.first_point;
   Point p = read_point(i);

@@ -1,9 +1,4 @@
-// Rays in unit space, and in the grid of a placed tree: packed/kernels/enter.h.
-
-struct UnitRay {
-  vec3 origin, direction;
-  float tnear, tmax; // tmax: inclusive end, the float below tfar, or the t of the nearest hit so far
-};
+// Rays in the grid of a placed tree: packed/kernels/enter.h.
 struct GridRay {
   vec3 inverse;             // reciprocals of the direction, always finite
   vec3 near_bias, far_bias; // the ray crosses a plane p at p inverse + bias
@@ -19,9 +14,6 @@ struct GridRay {
 const float kMinDirection = 1.0 / 1099511627776.0;
 const float kGradedPad = 1.0 / 65536.0;
 
-UnitRay unit_ray(vec3 origin, vec3 direction, float tnear, float tfar) {
-  return UnitRay(origin, direction, tnear, uintBitsToFloat(floatBitsToUint(tfar) - 1u));
-}
 vec3 along_k(vec3 v, uint major) { return major == 0u ? v : major == 1u ? v.yzx : v.zxy; }
 
 // Whether rays may start far away from a placed tree. Those from the surface of the only one do not.

@@ -3,6 +3,14 @@
 #include "records.glsl"
 #include "arithmetic.glsl"
 
+// RAY_PIPELINE: a ray generation shader, which leaves traversal to the driver; else a compute kernel.
+#ifdef RAY_PIPELINE
+#extension GL_EXT_ray_tracing : require
+#define THREAD gl_LaunchIDEXT.x
+#else
+#define THREAD gl_GlobalInvocationID.x
+#endif
+
 layout(constant_id = 2) const uint kStack = 112;           // entries that a traversal may push
 layout(constant_id = 3) const bool kManyPlacements = true; // there is a tree over placements
 layout(constant_id = 4) const bool kAnyFine = true;        // some tree has kFineTree or kInexactDifferences
@@ -151,4 +159,15 @@ uint next_number(Cluster c, inout Walk w) {
   ++w.corner;
   w.rank += fresh ? 1u : 0u;
   return number;
+}
+
+// The numbers of a triangle's vertices.
+uvec3 triangle_vertices(Cluster c, uint triangle) {
+  uvec2 lead;
+  Walk w = begin_walk(c, triangle, lead);
+  if ((w.restarts & 1u) != 0u) {
+    lead.x = next_number(c, w);
+    lead.y = next_number(c, w);
+  }
+  return uvec3(lead, next_number(c, w));
 }

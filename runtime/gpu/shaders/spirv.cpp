@@ -73,6 +73,36 @@ constexpr uint32_t kDenoisePass4[] = {
 #include <denoise_pass_4.inc>
 };
 
+constexpr uint32_t kTraceAnyRays[] = {
+#include <trace_any_rays.inc>
+};
+constexpr uint32_t kTraceClosestRays[] = {
+#include <trace_closest_rays.inc>
+};
+constexpr uint32_t kCameraRays[] = {
+#include <camera_rays.inc>
+};
+constexpr uint32_t kViewRays[] = {
+#include <view_rays.inc>
+};
+constexpr uint32_t kOcclusionNearestRays[] = {
+#include <occlusion_nearest_rays.inc>
+};
+constexpr uint32_t kOcclusionCountRays[] = {
+#include <occlusion_count_rays.inc>
+};
+constexpr uint32_t kClosestHit[] = {
+#include <closest_hit.inc>
+};
+constexpr uint32_t kAnyHit[] = {
+#include <any_hit.inc>
+};
+constexpr uint32_t kMiss[] = {
+#include <miss.inc>
+};
+constexpr uint32_t kDecodeTriangles[] = {
+#include <decode_triangles.inc>
+};
 } // namespace
 
 std::span<const uint32_t> probe() { return kProbe; }
@@ -88,6 +118,16 @@ std::span<const uint32_t> occlusion_image() { return kOcclusionImage; }
 std::span<const uint32_t> occlusion_nearest() { return kOcclusionNearest; }
 std::span<const uint32_t> occlusion_queue() { return kOcclusionQueue; }
 std::span<const uint32_t> occlusion_queue_partitioned() { return kOcclusionQueuePartitioned; }
+std::span<const uint32_t> trace_any_rays() { return kTraceAnyRays; }
+std::span<const uint32_t> trace_closest_rays() { return kTraceClosestRays; }
+std::span<const uint32_t> camera_rays() { return kCameraRays; }
+std::span<const uint32_t> view_rays() { return kViewRays; }
+std::span<const uint32_t> occlusion_nearest_rays() { return kOcclusionNearestRays; }
+std::span<const uint32_t> occlusion_count_rays() { return kOcclusionCountRays; }
+std::span<const uint32_t> closest_hit() { return kClosestHit; }
+std::span<const uint32_t> any_hit() { return kAnyHit; }
+std::span<const uint32_t> miss() { return kMiss; }
+std::span<const uint32_t> decode_triangles() { return kDecodeTriangles; }
 std::span<const uint32_t> denoise_compare() { return kDenoiseCompare; }
 std::span<const uint32_t> denoise_history() { return kDenoiseHistory; }
 std::span<const uint32_t> denoise_correct() { return kDenoiseCorrect; }

@@ -21,6 +21,20 @@ std::span<const uint32_t> occlusion_queue();
 /// For devices with DeviceTraits::partitioned.
 std::span<const uint32_t> occlusion_queue_partitioned();
 
+/// Writes the triangles that acceleration structures are built from.
+std::span<const uint32_t> decode_triangles();
+
+/// Ray generation shaders of ray tracing pipelines, and the shaders that they share.
+std::span<const uint32_t> trace_any_rays();
+std::span<const uint32_t> trace_closest_rays();
+std::span<const uint32_t> camera_rays();
+std::span<const uint32_t> view_rays();
+std::span<const uint32_t> occlusion_nearest_rays();
+std::span<const uint32_t> occlusion_count_rays();
+std::span<const uint32_t> closest_hit();
+std::span<const uint32_t> any_hit();
+std::span<const uint32_t> miss();
+
 std::span<const uint32_t> denoise_compare();
 std::span<const uint32_t> denoise_history();
 std::span<const uint32_t> denoise_correct();

@@ -1,9 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Traces a span of rays. CLOSEST: nearest hits, else any hits.
-#include "traversal.glsl"
+#include "trace.glsl"
 
-layout(local_size_x = 64) in;
 layout(std430, binding = 9) readonly restrict buffer Rays { RayRecord rays[]; };
 #ifdef CLOSEST
 layout(std430, binding = 10) writeonly restrict buffer Hits { HitRecord hits[]; };
@@ -13,7 +12,7 @@ layout(std430, binding = 10) writeonly restrict buffer Occluded { uint occluded[
 layout(push_constant) uniform Push { SpanRecord span; };
 
 void main() {
-  uint i = gl_GlobalInvocationID.x;
+  uint i = THREAD;
   if (i >= span.count) return;
   i += span.first;
   UnitRay u = unit_ray(vec3(rays[i].origin[0], rays[i].origin[1], rays[i].origin[2]),

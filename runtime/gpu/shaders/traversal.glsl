@@ -1,14 +1,10 @@
 // One ray, one thread, through the tree over placements and the placed trees. CLOSEST: nearest hits, else any hits.
 #define WEIGHTS
 #include "scene.glsl"
+#include "unit_ray.glsl"
 #include "rays.glsl"
 #include "triangles.glsl"
 #include "masks.glsl"
-
-struct Best {
-  float u, v;
-  uint placement, cluster, triangle; // placement 0xffffffff: none
-};
 
 // Entries are groups of nodes that are still to be visited: their first number, and which. For any hits a bit mask, of
 // which the lowest is next; for nearest hits nibbles 8 | slot, nearest first.

@@ -3,9 +3,8 @@
 // Makes the rays of a picture's pixels and finds their nearest hits. The rays have the bits of
 // PrimaryCamera::linear_ray() and approach_scene().
 #define CLOSEST
-#include "traversal.glsl"
+#include "trace.glsl"
 
-layout(local_size_x = 64) in;
 layout(std430, binding = 9) readonly restrict buffer Views { ViewRecord view; };
 layout(std430, binding = 10) readonly restrict buffer Film { double film[]; }; // x of columns, then y of rows
 layout(std430, binding = 11) writeonly restrict buffer Hits { HitRecord hits[]; };
@@ -42,7 +41,7 @@ bool approach_scene(inout dvec3 origin, dvec3 direction) {
 }
 
 void main() {
-  uint i = gl_GlobalInvocationID.x;
+  uint i = THREAD;
   if (i >= span.count) return;
   i += span.first;
   // Blocks of 8 x 4 pixels; those at the right and lower edge are not full.

@@ -85,7 +85,7 @@ def render(
     ao_settings: Mapping[str, float] = ...,
     view: Literal["ao", "pbr", "pbr+ao"] = ...,
     shade_settings: Mapping[str, float] = ...,
-    backend: Literal["packed", "gpu", "embree"] = ...,
+    backend: Literal["packed", "gpu", "gpu-rt", "embree"] = ...,
     seed: int = ...,
 ) -> dict[str, NDArray[Any]]:
     """Renders a view. Returns arrays with rows from top to bottom, of height x width pixels:

@@ -29,10 +29,12 @@ gpu::ClusterRecord cluster_record(const packed::TraceCluster& cluster, const uin
 
 } // namespace
 
-GpuTables::GpuTables(const BakedFile& file, const SceneSource& source, const PackedTracer& tracer)
-    : file_(file), source_(source), tracer_(tracer) {
+GpuTables::GpuTables(const BakedFile& file, const SceneSource& source, const PackedTracer& tracer,
+                     GpuStructures structures)
+    : file_(file), source_(source), tracer_(tracer), structures_(structures) {
   add_trees();
   add_clusters();
+  if (structures == GpuStructures::kDriver) add_bottom_levels();
   update_placements();
 }
 
@@ -62,6 +64,48 @@ void GpuTables::add_clusters() {
     if ((all[i].flags & packed::kNeedsWideDecode) != 0) add_exact_vertices(i, record);
     if ((all[i].flags & packed::kMasked) != 0) add_masked_cluster(i, record);
   }
+}
+
+/// Divides the clusters of each tree by the rays that hit them.
+void GpuTables::add_bottom_levels() {
+  const TracedTrees& traced = tracer_.traced_trees();
+  for (uint32_t tree = 0; tree < traced.records.size(); ++tree) {
+    const baked::TreeRecord& record = traced.records[tree];
+    std::vector<uint32_t> clusters;
+    for (const baked::PackedNode& node : traced.nodes.subspan(record.first_node, record.node_count))
+      if (node.has_leaves() && node.children[0] != baked::kNoChild) clusters.push_back(node.cluster);
+    std::ranges::sort(clusters);
+    const auto repeated = std::ranges::unique(clusters);
+    clusters.erase(repeated.begin(), repeated.end());
+    for (const uint32_t classes : {kCameraRays, kOcclusionRays, kCameraRays | kOcclusionRays})
+      add_bottom_level(tree, classes, clusters);
+  }
+}
+
+/// Adds the structure of the clusters of a tree that exactly these rays hit, if there are any.
+void GpuTables::add_bottom_level(uint32_t tree, uint32_t ray_classes, std::span<const uint32_t> clusters) {
+  const std::span<const packed::TraceCluster> all = tracer_.traced_trees().clusters();
+  const baked::TreeRecord& grid = tracer_.traced_trees().records[tree];
+  gpu::BottomLevel level;
+  level.tree = tree, level.ray_classes = ray_classes;
+  StructureKey key = {ray_classes, grid.step_mantissa, static_cast<uint64_t>(grid.step_exponent)};
+  for (const int64_t axis : grid.origin) key.push_back(static_cast<uint64_t>(axis));
+  for (const bool masked : {false, true}) {
+    gpu::BottomLevel::Part& part = level.parts[masked ? 1 : 0];
+    part.first_range = static_cast<uint32_t>(ranges_.size());
+    for (const uint32_t cluster : clusters) {
+      const uint8_t flags = all[cluster].flags;
+      if ((flags & (kCameraRays | kOcclusionRays)) != ray_classes || ((flags & packed::kMasked) != 0) != masked)
+        continue;
+      ranges_.push_back({static_cast<uint32_t>(part.triangles), cluster});
+      part.triangles += all[cluster].triangle_count;
+      key.push_back(cluster);
+    }
+    part.range_count = static_cast<uint32_t>(ranges_.size()) - part.first_range;
+  }
+  if (level.triangles() == 0) return;
+  bottom_levels_.push_back(level);
+  structure_keys_.push_back(std::move(key));
 }
 
 uint32_t GpuTables::geometry_of(uint32_t cluster) const {
@@ -146,13 +190,14 @@ void GpuTables::update_placements() {
 gpu::SceneTables GpuTables::view() const {
   const packed::KernelScene& scene = tracer_.kernel_scene();
   gpu::SceneTables out{};
-  out.nodes = tracer_.traced_trees().nodes;
+  const bool packed_nodes = structures_ == GpuStructures::kPacked;
+  if (packed_nodes) out.nodes = tracer_.traced_trees().nodes;
   out.trees = trees_;
   out.clusters = clusters_;
   out.payload = file_.sections().payload;
   out.placements = {scene.placements, scene.placement_count};
   out.top = scene.top;
-  out.top_nodes = tracer_.placed_trees().top_nodes();
+  if (packed_nodes) out.top_nodes = tracer_.placed_trees().top_nodes();
   out.exact_vertices = exact_vertices_;
   out.masks = masks_;
   out.scene = {scene.placement_count, placements_word_, scene.top_max_coordinate, scene.top_pad_coordinate};

@@ -51,30 +51,67 @@ gpu::ViewRecord view_record(const PrimaryCamera& camera, const UnitSpace& space)
 
 } // namespace
 
-GpuTracer::GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers)
-    : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_) {
-  upload(config);
+GpuTracer::GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers,
+                     std::shared_ptr<StructureCache> cache)
+    : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_, config.structures) {
+  upload(config, std::move(cache));
 }
 
-GpuTracer::GpuTracer(const BakedFile& file, const LodSource& source, const GpuConfig& config, const Movers& movers)
-    : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_) {
-  upload(config);
+GpuTracer::GpuTracer(const BakedFile& file, const LodSource& source, const GpuConfig& config, const Movers& movers,
+                     std::shared_ptr<StructureCache> cache)
+    : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_, config.structures) {
+  upload(config, std::move(cache));
 }
 
-void GpuTracer::upload(const GpuConfig& config) {
+GpuTracer::~GpuTracer() {
+  if (cache_) cache_->give_back(structures_);
+}
+
+void GpuTracer::upload(const GpuConfig& config, std::shared_ptr<StructureCache> cache) {
   scene_ = std::make_unique<gpu::GpuScene>(config, tables_.view());
+  if (config.structures == GpuStructures::kDriver) {
+    if (!cache) cache = std::make_shared<StructureCache>(config);
+    scene_->use_structures(cache->memory(), tables_.ranges());
+    structures_ = cache->take(*scene_->structures(), tables_.bottom_levels(), tables_.structure_keys());
+    cache_ = std::move(cache);
+    place_structures();
+  }
   device_rays_ = std::make_unique<gpu::DeviceRays>(*scene_);
   device_ = scene_->device_name() + (scene_->emulates_floats() ? ", exact floats" : "");
 }
 
+void GpuTracer::place_structures() const {
+  structures_generation_ = cache_->generation();
+  const packed::KernelScene& scene = packed_.kernel_scene();
+  scene_->place_structures({scene.placements, scene.placement_count}, tables_.bottom_levels(),
+                           cache_->structures(structures_));
+}
+
+/// Begins a frame of the cache.
+void GpuTracer::begin_picture() const {
+  if (!cache_) return;
+  const std::lock_guard lock(structures_mutex_);
+  cache_->next_frame(*scene_->structures());
+}
+
+/// Places the structures again if the cache has moved some.
+void GpuTracer::follow_structures() const {
+  if (!cache_) return;
+  const std::lock_guard lock(structures_mutex_);
+  if (structures_generation_ != cache_->generation()) place_structures();
+}
+
 void GpuTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
   assert(hits.size() == rays.size());
+  follow_structures();
   scene_->closest({kernel_rays(rays), rays.size()}, ray_class, {kernel_hits(hits), hits.size()});
 }
 
 void GpuTracer::trace_view(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                            const Progress& progress) const {
   assert(hits.size() == rays.size());
+  begin_picture();
+  follow_structures();
   scene_->closest({kernel_rays(rays), rays.size()}, ray_class, {kernel_hits(hits), hits.size()},
                   [&] { progress.check_cancelled(); });
 }
@@ -88,6 +125,8 @@ std::shared_ptr<gpu::DeviceView> GpuTracer::trace_camera(const PrimaryCamera& ca
   for (uint32_t x = 0; x < size.width; ++x) film[x] = camera.film_x(x);
   for (uint32_t y = 0; y < size.height; ++y) film[size.width + y] = camera.film_y(y);
   const std::lock_guard lock(device_rays_mutex_);
+  begin_picture();
+  follow_structures();
   try {
     return device_rays_->trace_view(view_record(camera, space()), film, ray_class, std::move(reused),
                                     [&](double) { progress.check_cancelled(); });
@@ -132,6 +171,7 @@ void GpuTracer::trace_parts(const OcclusionPoints& points, const OcclusionSample
 /// @param report of the share that is done
 void GpuTracer::trace_part(const OcclusionPoints& points, size_t first, size_t count, const OcclusionSamples& samples,
                            const std::function<void(double)>& report) const {
+  follow_structures();
   const gpu::OcclusionRecord record = occlusion_record(samples, scene_->subgroup_size());
   device_rays_->set_points(count, [&](std::span<gpu::PointRecord> out) {
     points.write(first, {reinterpret_cast<OcclusionPoint*>(out.data()), out.size()});
@@ -182,6 +222,7 @@ void GpuTracer::read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao
 
 void GpuTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<uint8_t> occluded) const {
   assert(occluded.size() == rays.size());
+  follow_structures();
   scene_->any({kernel_rays(rays), rays.size()}, ray_class, occluded);
 }
 
@@ -189,11 +230,29 @@ void GpuTracer::place_instances(std::span<const uint32_t> instances, std::span<c
   packed_.place_instances(instances, world_from_object);
   tables_.update_placements();
   scene_->replace_placements(tables_.view());
+  if (cache_) place_structures();
+}
+
+std::vector<TreeBytes> GpuTracer::tree_bytes() const {
+  if (!cache_) return packed_.tree_bytes();
+  const TracedTrees& traced = packed_.traced_trees();
+  std::vector<TreeBytes> trees(traced.records.size());
+  for (uint32_t geometry = 0; geometry < traced.tree_of.size(); ++geometry)
+    if (const uint32_t tree = traced.tree_of[geometry];
+        tree != baked::kNone && traced.records[tree].geometry != baked::kWorldTree)
+      trees[tree].geometry = geometry;
+  for (size_t i = 0; i < structures_.size(); ++i) {
+    TreeBytes& tree = trees[tables_.bottom_levels()[i].tree];
+    const auto [worst_case, now] = cache_->bytes(structures_[i]);
+    tree.worst_case += worst_case, tree.built += now;
+  }
+  return trees;
 }
 
 std::vector<ResidentPart> GpuTracer::resident() const {
   std::vector<ResidentPart> parts = packed_.resident();
   parts.push_back({"on the GPU", scene_->bytes(), false});
+  if (cache_) parts.push_back({"acceleration structures", cache_->stats().resident_bytes, true});
   return parts;
 }
 

@@ -7,23 +7,29 @@
 #include "runtime/gpu/device_rays.h"
 #include "runtime/gpu/gpu_config.h"
 #include "runtime/trace/gpu/gpu_tables.h"
+#include "runtime/trace/gpu/structure_cache.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 #include "runtime/trace/ray_tracer.h"
 #include "runtime/trace/view_tracer.h"
 
 namespace packtrace {
 
-/// Traces the packed clusters of a baked file on a GPU; its hits are PackedTracer's, bit for bit (docs/gpu.md). The
-/// packed tracer beside it chooses the trees, places instances and resolves hits.
+/// Traces the packed clusters of a baked file on a GPU; its hits are PackedTracer's, bit for bit (docs/gpu.md). With
+/// GpuStructures::kDriver the driver traces decoded triangles instead, and its rounding decides which triangle a ray hits.
+/// The packed tracer beside it chooses the trees, places instances and resolves hits.
 class GpuTracer final : public RayTracer, public ViewTracer {
 public:
   /// Keeps references, as PackedTracer does. Throws as PackedTracer and gpu::GpuScene do, and Error(kUnsupported) for
   /// geometry that deforms.
-  GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers = {});
+  /// @param cache with GpuStructures::kDriver: structures that tracers of the file share; null: of its own
+  GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers = {},
+            std::shared_ptr<StructureCache> cache = nullptr);
   /// Does the same at the detail of a plan, whose trees are made on the CPU.
-  GpuTracer(const BakedFile& file, const LodSource& source, const GpuConfig& config, const Movers& movers = {});
+  GpuTracer(const BakedFile& file, const LodSource& source, const GpuConfig& config, const Movers& movers = {},
+            std::shared_ptr<StructureCache> cache = nullptr);
+  ~GpuTracer() override;
 
-  std::string_view name() const override { return "gpu"; }
+  std::string_view name() const override { return cache_ ? "gpu-rt" : "gpu"; }
   std::string_view isa() const override { return device_; }
   const UnitSpace& space() const override { return packed_.space(); }
   uint32_t preferred_rays_per_call() const override { return 1u << 16; }
@@ -52,13 +58,16 @@ public:
   }
   std::vector<ResidentPart> resident() const override;
   std::span<const uint32_t> flat_instances() const override { return packed_.flat_instances(); }
-  std::vector<TreeBytes> tree_bytes() const override { return packed_.tree_bytes(); }
+  std::vector<TreeBytes> tree_bytes() const override;
 
   const gpu::GpuScene& scene() const { return *scene_; }
   const PackedTracer& packed() const { return packed_; }
 
 private:
-  void upload(const GpuConfig& config);
+  void upload(const GpuConfig& config, std::shared_ptr<StructureCache> cache);
+  void place_structures() const;
+  void begin_picture() const;
+  void follow_structures() const;
   /// Takes the results of points [first, first + count) from the device.
   using TakeSums = std::function<void(size_t first, size_t count)>;
   void trace_parts(const OcclusionPoints& points, const OcclusionSamples& samples, const TakeSums& take,
@@ -69,6 +78,10 @@ private:
   PackedTracer packed_;
   GpuTables tables_;
   std::unique_ptr<gpu::GpuScene> scene_;
+  std::shared_ptr<StructureCache> cache_; ///< null unless the driver traces
+  std::vector<uint32_t> structures_;      ///< of the cache, by bottom level
+  mutable std::mutex structures_mutex_;
+  mutable uint64_t structures_generation_ = 0; ///< of the cache, when the structures were placed
   std::unique_ptr<gpu::DeviceRays> device_rays_;
   mutable std::mutex device_rays_mutex_;
   std::string device_; ///< its name, and how it makes floats

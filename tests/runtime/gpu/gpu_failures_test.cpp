@@ -52,16 +52,19 @@ TEST(GpuFailures, DevicesWithoutTheFeatures) {
   gpu::DeviceFeatures all;
   all.api_version = VK_API_VERSION_1_3, all.int64 = all.float64 = all.computes = true;
   all.subgroups = ~VkSubgroupFeatureFlags{0}, all.storage_buffers = 16;
-  EXPECT_EQ(gpu::missing_features(all), "");
+  EXPECT_EQ(gpu::missing_features(all, GpuStructures::kPacked), "");
   gpu::DeviceFeatures one = all;
   one.float64 = false;
-  EXPECT_EQ(gpu::missing_features(one), "shaderFloat64");
+  EXPECT_EQ(gpu::missing_features(one, GpuStructures::kPacked), "shaderFloat64");
   one = all, one.api_version = VK_API_VERSION_1_1, one.int64 = false;
-  EXPECT_EQ(gpu::missing_features(one), "Vulkan 1.2, shaderInt64");
+  EXPECT_EQ(gpu::missing_features(one, GpuStructures::kPacked), "Vulkan 1.2, shaderInt64");
   one = all, one.subgroups = all.subgroups & ~VkSubgroupFeatureFlags{VK_SUBGROUP_FEATURE_SHUFFLE_BIT};
-  EXPECT_EQ(gpu::missing_features(one), "subgroup ballot, shuffle and arithmetic");
+  EXPECT_EQ(gpu::missing_features(one, GpuStructures::kPacked), "subgroup ballot, shuffle and arithmetic");
   one = all, one.storage_buffers = 15, one.computes = false;
-  EXPECT_EQ(gpu::missing_features(one), "16 storage buffers per kernel, a compute queue");
+  EXPECT_EQ(gpu::missing_features(one, GpuStructures::kPacked), "16 storage buffers per kernel, a compute queue");
+  EXPECT_EQ(gpu::missing_features(all, GpuStructures::kDriver), "acceleration structures and ray tracing pipelines");
+  all.structures = true;
+  EXPECT_EQ(gpu::missing_features(all, GpuStructures::kDriver), "");
 }
 
 class GpuFailuresOnDevice : public test::OnGpu {};

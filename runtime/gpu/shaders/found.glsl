@@ -1,0 +1,6 @@
+// What hit shaders and ray generation shaders exchange.
+struct Found {
+  float t;
+  Best best;
+  uint ray_class;
+};
