@@ -224,7 +224,7 @@ uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuf
   ao.ray_length = config.radius;
   ao.stratified = is_stratified(config.sampler);
   ao.samples = least_samples(plan);
-  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer); view && traces_view_occlusion(*view, config, plan))
+  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer); view && traces_view_occlusion(config, plan))
     return trace_view_occlusion(*view, tracer.space(), gbuffer, config, ao_radius(config, source.world_bounds()), plan,
                                 ao, progress);
   ao.on_gpu = nullptr;

@@ -94,10 +94,9 @@ OcclusionSamples samples_of(const AoConfig& config, const SamplePlan& plan, floa
 
 } // namespace
 
-bool traces_view_occlusion(const ViewTracer& tracer, const AoConfig& config, const SamplePlan& plan) {
+bool traces_view_occlusion(const AoConfig& config, const SamplePlan& plan) {
   return config.sampler == SamplerKind::kSpaceTimeNet && config.interreflection == 0.0f && plan.pixel_count.empty() &&
-         plan.pixel_first.empty() && (config.falloff || config.min_visibility == 0.0f) &&
-         tracer.traces_occlusion(config.falloff);
+         plan.pixel_first.empty() && (config.falloff || config.min_visibility == 0.0f);
 }
 
 uint64_t trace_view_occlusion(const ViewTracer& tracer, const UnitSpace& space, const GBuffer& gbuffer,

@@ -8,9 +8,9 @@
 
 namespace packtrace {
 
-/// Whether a tracer makes the occlusion rays of a configuration and plan itself, with the results of spans of rays: the
-/// default sampler, equally many samples per pixel, no interreflection, and hits that occlude fully or by a curve.
-bool traces_view_occlusion(const ViewTracer& tracer, const AoConfig& config, const SamplePlan& plan);
+/// Whether a ViewTracer makes the occlusion rays of a configuration and plan itself, with the results of spans of rays:
+/// the default sampler, equally many samples per pixel, no interreflection, and hits that occlude fully or by a curve.
+bool traces_view_occlusion(const AoConfig& config, const SamplePlan& plan);
 
 /// trace_ao() for such tracers. Returns the number of rays.
 /// @param radius of occlusion, world units

@@ -268,8 +268,9 @@ void add_measure_command(CLI::App& app, GlobalOptions& globals, const std::strin
                   "Denoiser of the points that are denoised, as of render: ours or reference (default ours)")
       ->check(one_of({"ours", "reference"}))
       ->type_name("NAME");
-  verb.add_option("--backend", options->backend,
-                  "Ray tracer of the packed files' pictures: packed, gpu with the same hits, or gpu-rt (default packed)")
+  verb.add_option(
+          "--backend", options->backend,
+          "Ray tracer of the packed files' pictures: packed, gpu with the same hits, or gpu-rt (default packed)")
       ->check(one_of({"packed", "gpu", "gpu-rt"}));
   verb.add_option("--gpu-device", options->gpu_device,
                   "Part of the name of the Vulkan device to use, as of render; requires --backend gpu or gpu-rt")

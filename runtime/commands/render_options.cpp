@@ -111,7 +111,8 @@ void add_tracer_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option(
           "--gpu-device", options.gpu_device,
           "Part of the name of the Vulkan device to use, in any case; selects --backend gpu unless gpu-rt is chosen "
-          "(default: a discrete GPU, else another GPU). Devices that run on the CPU, such as llvmpipe, are used by name only")
+          "(default: a discrete GPU, else another GPU). Devices that run on the CPU, such as llvmpipe, are used by "
+          "name only")
       ->type_name("NAME");
   verb.add_option(
           "--bvh,--bvh-quality", options.bvh,

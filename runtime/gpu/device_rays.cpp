@@ -11,6 +11,7 @@
 #include "runtime/gpu/device_view.h"
 #include "runtime/gpu/gpu_scene_state.h"
 #include "runtime/gpu/shaders/spirv.h"
+#include "runtime/gpu/timed_dispatches.h"
 
 namespace packtrace::gpu {
 namespace {
@@ -32,59 +33,6 @@ void require_few_pixels(uint32_t width, uint32_t height) {
   if ((uint64_t{width} + 8) * (uint64_t{height} + 8) > kMaxPoints)
     throw Error(ErrorKind::kLimitExceeded, "backend gpu: more than 2^31 pixels; use a smaller picture");
 }
-
-/// Sizes of dispatches. Parts of a picture differ in cost, so the slowest dispatch of late decides.
-struct Pace {
-  uint64_t rays = 1u << 14; ///< of the next dispatch
-  double slowest_ms = 0.0;  ///< time of a ray; 0: not known
-
-  /// Dispatches may grow to twice their size at once, and shrink to any.
-  void adapt(uint64_t last_rays, double ms, double wanted_ms) {
-    slowest_ms *= 0.8;
-    // Short dispatches do not fill the device: their time says little of longer ones.
-    if (ms > wanted_ms / 4) slowest_ms = std::max(slowest_ms, ms / static_cast<double>(last_rays));
-    const double grown = 2.0 * static_cast<double>(last_rays);
-    rays =
-        std::max(static_cast<uint64_t>(slowest_ms * grown > wanted_ms ? wanted_ms / slowest_ms : grown), uint64_t{1});
-  }
-};
-
-/// Runs work items in dispatches that take about the wanted time.
-class TimedDispatches {
-public:
-  /// @param pace of the dispatches, which follows their times
-  /// @param rays_per_item rays of a work item
-  TimedDispatches(Device& device, Pace& pace, uint64_t rays_per_item, uint64_t most_items,
-                  const DeviceRays::Watch& watch)
-      : device_(device), pace_(pace), rays_per_item_(rays_per_item), watch_(watch),
-        most_(std::max(most_items, uint64_t{1})) {}
-
-  /// @param run function of the first item and the number of items that returns ms
-  template <typename Run>
-  DeviceTime all(uint64_t count, uint64_t granularity, const Run& run) {
-    DeviceTime time;
-    for (uint64_t first = 0; first < count;) {
-      const uint64_t fitting = std::min(pace_.rays / rays_per_item_, most_);
-      const uint64_t wanted = std::max(fitting / granularity, uint64_t{1}) * granularity;
-      const uint64_t items = std::min(count - first, wanted);
-      if (watch_) watch_(static_cast<double>(first) / static_cast<double>(count));
-      const double ms = run(first, items);
-      first += items;
-      time.ms += ms, ++time.dispatches;
-      time.longest_ms = std::max(time.longest_ms, ms);
-      if (items == wanted || ms > device_.config().dispatch_ms)
-        pace_.adapt(items * rays_per_item_, ms, device_.config().dispatch_ms);
-    }
-    return time;
-  }
-
-private:
-  Device& device_;
-  Pace& pace_;
-  uint64_t rays_per_item_;
-  const DeviceRays::Watch watch_;
-  uint64_t most_;
-};
 
 /// Allocates an eighth more than is needed now, because the number of points changes from frame to frame; exactly as
 /// much if there is no room for more.
@@ -114,11 +62,13 @@ struct DeviceRays::State {
   Buffer cameras, hits, rays, counts, sums;
   StagedBuffer points, view, film;
   uint32_t point_count = 0;
-  std::unique_ptr<Kernel> camera_kernel, view_kernel, points_kernel, rays_kernel, queue_kernel, nearest_kernel;
+  std::unique_ptr<Kernel> camera_kernel, view_kernel, points_kernel, rays_kernel, nearest_kernel;
+  std::unique_ptr<Kernel> walk_kernel, queue_kernel; ///< of count_occluded()
   std::unique_ptr<Kernel> picture_kernel;
   uint64_t placed = 0;                                          ///< GpuScene::State::placed of the kernels
   std::vector<uint32_t> constants;                              ///< GpuScene::State::constants of the kernels
-  Pace camera_pace, queue_pace[kOrders], nearest_pace[kOrders]; ///< of occlusion rays by the order of samples
+  FasterKernel faster[kOrders];                                 ///< of count_occluded(), by the order of samples
+  Pace camera_pace, count_pace[kOrders], nearest_pace[kOrders]; ///< of occlusion rays by the order of samples
 
   void make_room(Buffer& buffer, uint64_t bytes, const char* what) {
     if (buffer.bytes() >= bytes) return;
@@ -132,9 +82,10 @@ struct DeviceRays::State {
     with_slack(bytes, [&](uint64_t all) { points = StagedBuffer(device, all, "points"); });
   }
   uint64_t most_threads() const { return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * kThreads; }
-  void make_queue_kernel();
-  template <typename Threads>
-  DeviceTime run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples, Pace& pace,
+  bool has_queue() const;
+  void make_count_kernels();
+  template <typename Run, typename Threads>
+  DeviceTime run_all(const Run& run, const OcclusionRecord& samples, uint32_t most_samples, Pace& pace,
                      const Threads& threads, const Watch& watch);
   /// Runs a kernel that traces a ray through each pixel, in blocks of 8 x 4 pixels.
   DeviceTime run_pixels(Kernel& kernel, std::span<const Buffer* const> buffers, uint32_t width, uint32_t height,
@@ -150,7 +101,8 @@ struct DeviceRays::State {
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
     const bool same = std::exchange(constants, scene.constants) == scene.constants;
-    for (auto* kernel : {&camera_kernel, &view_kernel, &points_kernel, &rays_kernel, &queue_kernel, &nearest_kernel})
+    for (auto* kernel :
+         {&camera_kernel, &view_kernel, &points_kernel, &rays_kernel, &walk_kernel, &queue_kernel, &nearest_kernel})
       if (same && *kernel)
         scene.bind_scene(**kernel);
       else
@@ -170,7 +122,9 @@ DeviceTime DeviceRays::trace_camera(const CameraRecord& camera, bool keep_rays) 
   s.make_room(s.hits, pixels * sizeof(packed::KernelHit), "hits");
   s.make_room(s.rays, keep_rays ? pixels * sizeof(packed::KernelRay) : 1, "rays");
   s.cameras = upload(s.device, push_bytes(camera), "the camera");
-  if (!s.camera_kernel) s.camera_kernel = s.scene.make_ray_kernel({spirv::camera(), spirv::camera_rays()}, kFirstBinding + 3, sizeof(SpanRecord));
+  if (!s.camera_kernel)
+    s.camera_kernel =
+        s.scene.make_ray_kernel({spirv::camera(), spirv::camera_rays()}, kFirstBinding + 3, sizeof(SpanRecord));
   const Buffer* const buffers[] = {&s.cameras, &s.hits, &s.rays};
   return s.run_pixels(*s.camera_kernel, buffers, camera.width, camera.height, baked::kVisibleToCamera, keep_rays, {});
 }
@@ -208,7 +162,8 @@ std::shared_ptr<DeviceView> DeviceRays::trace_view(const ViewRecord& view, std::
   s.view.write(commands, push_bytes(view));
   s.film.write(commands, std::as_bytes(film));
   s.device->run(commands);
-  if (!s.view_kernel) s.view_kernel = s.scene.make_ray_kernel({spirv::view(), spirv::view_rays()}, kFirstBinding + 3, sizeof(SpanRecord));
+  if (!s.view_kernel)
+    s.view_kernel = s.scene.make_ray_kernel({spirv::view(), spirv::view_rays()}, kFirstBinding + 3, sizeof(SpanRecord));
   const StagedBuffer& hits = reused->hits_buffer();
   const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &hits.device()};
   s.run_pixels(*s.view_kernel, buffers, view.width, view.height, ray_class, false, watch);
@@ -236,24 +191,33 @@ void DeviceRays::set_points(std::span<const PointRecord> points) {
 
 void DeviceRays::release() { state_->points = StagedBuffer(), state_->counts = Buffer(), state_->sums = Buffer(); }
 
-bool DeviceRays::can_count() const {
-  const uint32_t lanes = state_->device->traits().subgroup_size;
-  if (state_->scene.structures) return true;
-  return lanes >= kMinLanes && lanes <= kMaxLanes && state_->scene.node_count <= kMaxQueueNodes;
+/// Whether the queue kernel can count occluded rays: subgroups of 4 to 32 lanes, at most 2^24 nodes, no masks.
+bool DeviceRays::State::has_queue() const {
+  const uint32_t lanes = device->traits().subgroup_size;
+  return !scene.structures && !scene.masked && lanes >= kMinLanes && lanes <= kMaxLanes &&
+         scene.node_count <= kMaxQueueNodes;
 }
 
-void DeviceRays::State::make_queue_kernel() {
-  const std::span<const uint32_t> compute =
-      device->traits().partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue();
-  queue_kernel =
-      scene.make_ray_kernel({compute, spirv::occlusion_count_rays()}, kFirstBinding + 2, sizeof(OcclusionRecord));
+void DeviceRays::State::make_count_kernels() {
+  const auto make = [&](std::span<const uint32_t> compute) {
+    return scene.make_ray_kernel({compute, spirv::occlusion_count_rays()}, kFirstBinding + 2, sizeof(OcclusionRecord));
+  };
+  if (!walk_kernel) walk_kernel = make(spirv::occlusion_count());
+  if (!queue_kernel && has_queue())
+    queue_kernel = make(device->traits().partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue());
+  for (Kernel* kernel : {walk_kernel.get(), queue_kernel.get()}) {
+    if (kernel == nullptr) continue;
+    kernel->bind(kFirstBinding, points.device());
+    kernel->bind(kFirstBinding + 1, counts);
+  }
 }
 
-/// Runs a kernel for all points, and for at most `most_samples` of their samples at a time.
+/// Runs kernels for all points, and for at most `most_samples` of their samples at a time.
+/// @param run function of push constants and a number of groups that returns ms
 /// @param threads function of a number of samples: threads of a point
-template <typename Threads>
-DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecord& samples, uint32_t most_samples,
-                                      Pace& pace, const Threads& threads, const Watch& watch) {
+template <typename Run, typename Threads>
+DeviceTime DeviceRays::State::run_all(const Run& run, const OcclusionRecord& samples, uint32_t most_samples, Pace& pace,
+                                      const Threads& threads, const Watch& watch) {
   DeviceTime time;
   for (uint32_t done = 0; done < samples.sample_count;) {
     OcclusionRecord part = samples;
@@ -266,7 +230,7 @@ DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecor
     TimedDispatches dispatches(*device, pace, part.sample_count, most_threads() / per_point / 2, watch_part);
     const DeviceTime of_part = dispatches.all(point_count, 2 * kThreads, [&](uint64_t first, uint64_t count) {
       part.first_point = static_cast<uint32_t>(first), part.point_count = static_cast<uint32_t>(count);
-      return device->run(kernel, push_bytes(part), groups_of((count + 31) / 32 * 32 * per_point));
+      return run(part, groups_of((count + 31) / 32 * 32 * per_point));
     });
     time.ms += of_part.ms, time.dispatches += of_part.dispatches;
     time.longest_ms = std::max(time.longest_ms, of_part.longest_ms);
@@ -277,17 +241,19 @@ DeviceTime DeviceRays::State::run_all(const Kernel& kernel, const OcclusionRecor
 
 DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watch& watch) {
   State& s = *state_;
-  if (!can_count())
-    throw Error(ErrorKind::kUnsupported, "backend gpu: counting occluded rays needs subgroups of 4 to 32 lanes and at "
-                                         "most 2^24 nodes");
   s.follow_scene();
   s.make_room(s.counts, (uint64_t{s.point_count} + 1) * sizeof(uint32_t), "counts");
   s.device->fill(s.counts, 0);
-  if (!s.queue_kernel) s.make_queue_kernel();
-  s.queue_kernel->bind(kFirstBinding, s.points.device());
-  s.queue_kernel->bind(kFirstBinding + 1, s.counts);
+  s.make_count_kernels();
+  FasterKernel& faster = s.faster[samples.order];
+  const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
+    const size_t number = s.queue_kernel ? faster.next() : 0;
+    const double ms = s.device->run(number == 0 ? *s.walk_kernel : *s.queue_kernel, push_bytes(part), groups);
+    faster.add(number, uint64_t{part.point_count} * part.sample_count, ms);
+    return ms;
+  };
   const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };
-  const DeviceTime time = s.run_all(*s.queue_kernel, samples, kMaxSamples, s.queue_pace[samples.order], threads, watch);
+  const DeviceTime time = s.run_all(run, samples, kMaxSamples, s.count_pace[samples.order], threads, watch);
   uint32_t lost = 0;
   download(s.device, s.counts, s.counts.bytes() - sizeof lost, std::as_writable_bytes(std::span(&lost, 1)));
   if (lost != 0)
@@ -302,12 +268,14 @@ DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& 
   s.make_room(s.sums, uint64_t{s.point_count} * 2 * sizeof(double), "sums");
   s.device->fill(s.sums, 0);
   if (!s.nearest_kernel)
-    s.nearest_kernel = s.scene.make_ray_kernel({spirv::occlusion_nearest(), spirv::occlusion_nearest_rays()}, kFirstBinding + 2, sizeof(OcclusionRecord));
+    s.nearest_kernel = s.scene.make_ray_kernel({spirv::occlusion_nearest(), spirv::occlusion_nearest_rays()},
+                                               kFirstBinding + 2, sizeof(OcclusionRecord));
   s.nearest_kernel->bind(kFirstBinding, s.points.device());
   s.nearest_kernel->bind(kFirstBinding + 1, s.sums);
-  return s.run_all(
-      *s.nearest_kernel, samples, kMaxNearestSamples, s.nearest_pace[samples.order], [](uint32_t) { return 1u; },
-      watch);
+  const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
+    return s.device->run(*s.nearest_kernel, push_bytes(part), groups);
+  };
+  return s.run_all(run, samples, kMaxNearestSamples, s.nearest_pace[samples.order], [](uint32_t) { return 1u; }, watch);
 }
 
 std::shared_ptr<DeviceAo> DeviceRays::empty_picture(size_t pixels, std::shared_ptr<DeviceAo> reused) const {
@@ -338,6 +306,18 @@ void DeviceRays::write_picture(DeviceAo& picture, uint32_t sample_count, bool ne
 
 void DeviceRays::read_picture(const DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const {
   picture.read(ao, hit_distance);
+}
+
+std::map<std::string, std::vector<std::pair<std::string, double>>> DeviceRays::kernel_statistics() const {
+  std::map<std::string, std::vector<std::pair<std::string, double>>> all;
+  const std::pair<const char*, const Kernel*> kernels[] = {{"camera", state_->camera_kernel.get()},
+                                                           {"view", state_->view_kernel.get()},
+                                                           {"count occluded, walk", state_->walk_kernel.get()},
+                                                           {"count occluded, queue", state_->queue_kernel.get()},
+                                                           {"sum nearest", state_->nearest_kernel.get()}};
+  for (const auto& [name, kernel] : kernels)
+    if (kernel != nullptr) all[name] = kernel->statistics();
+  return all;
 }
 
 uint32_t DeviceRays::point_count() const { return state_->point_count; }

@@ -2,8 +2,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "runtime/gpu/gpu_scene.h"
 
@@ -47,10 +51,8 @@ public:
   /// Does the same with points that are there.
   void set_points(std::span<const PointRecord> points);
 
-  /// Whether the device can run count_occluded(): subgroups of 4 to 32 lanes, and at most 2^24 nodes.
-  bool can_count() const;
   /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
-  /// Throws Error(kUnsupported) unless can_count(), and if a kernel's loop ended early.
+  /// Throws Error(kUnsupported) if a kernel's loop ended early.
   DeviceTime count_occluded(const OcclusionRecord& samples, const Watch& watch = {});
   /// Sums visibility and distance of the nearest hits of each point's rays up, in the order of the samples.
   DeviceTime sum_nearest(const OcclusionRecord& samples, const Watch& watch = {});
@@ -67,6 +69,9 @@ public:
 
   /// Frees the memory of points and of their results.
   void release();
+
+  /// Kernel::statistics() of the kernels in use, by name.
+  std::map<std::string, std::vector<std::pair<std::string, double>>> kernel_statistics() const;
 
   uint32_t point_count() const;
   /// Downloads the results of trace_camera(), one per pixel.

@@ -26,6 +26,7 @@ struct GpuConfig {
   GpuArithmetic arithmetic = GpuArithmetic::kProbed;
   GpuStructures structures = GpuStructures::kPacked;
   double dispatch_ms = 50.0;             ///< time that a dispatch should take at most; work is split accordingly
+  bool statistics = false;               ///< kernels know what the compiler says of them, where the driver tells
   bool validation = false;               ///< Vulkan's validation layer, where it is installed
   std::string loader = "libvulkan.so.1"; ///< shared library of the Vulkan loader
 

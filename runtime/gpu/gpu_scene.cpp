@@ -117,7 +117,7 @@ void GpuScene::State::set_constants(const SceneTables& t) {
                t.exact_vertices.empty() ? 0u : 1u,
                traits.half_bytes ? 1u : 0u,
                std::max(4u, (kLeafCorners + traits.subgroup_size - 1) / traits.subgroup_size)};
-  top_levels = levels, many_placements = !t.top_nodes.empty();
+  top_levels = levels, many_placements = !t.top_nodes.empty(), masked = !t.masks.empty();
 }
 
 void GpuScene::State::make_kernels() {

@@ -34,8 +34,8 @@ struct SceneTables {
 struct BottomLevel;
 
 /// A scene on a device. Hits are those of the CPU's packed kernels, bit for bit, where DeviceTraits::fused_floats or
-/// the exact arithmetic holds; with GpuStructures::kDriver they are those that the driver finds. All const functions may
-/// be called from several threads; they take turns.
+/// the exact arithmetic holds; with GpuStructures::kDriver they are those that the driver finds. All const functions
+/// may be called from several threads; they take turns.
 class GpuScene {
 public:
   /// Opens a device and uploads the scene. Throws as Device::open() and Buffer do.

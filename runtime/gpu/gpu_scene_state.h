@@ -28,12 +28,13 @@ struct GpuScene::State {
   bool exact = false;
   Buffer nodes, clusters, payload, trees, exact_vertices, masks;
   StagedBuffer placements, top_nodes, scene;
-  std::vector<std::byte> placed_materials; ///< the words of `masks` that belong to placements
+  std::vector<std::byte> placed_materials;   ///< the words of `masks` that belong to placements
   std::unique_ptr<RayStructures> structures; ///< null unless the driver traverses
   std::unique_ptr<Kernel> closest, any;
   std::vector<uint32_t> constants; ///< of all kernels: scene.glsl
   uint32_t top_levels = 0;         ///< that the kernels have room for
   bool many_placements = false;    ///< whether the kernels traverse a tree over placements
+  bool masked = false;             ///< whether some hits depend on masks
   size_t node_count = 0;
   uint64_t placed = 0;         ///< times that buffers of placements were replaced
   uint64_t uploaded_bytes = 0; ///< of placements and what depends on them, by the last replacement

@@ -25,11 +25,11 @@ struct TracerConfig {
   Movers movers = {}; ///< instances that RayTracer::place_instances() may move
   GpuConfig gpu = {}; ///< of backend gpu
   /// With GpuStructures::kDriver: the structures that all tracers of the scene share; null: each has its own.
-  std::shared_ptr<StructureCache> structures;
+  std::shared_ptr<StructureCache> structures = nullptr;
 };
 
-/// Chooses a backend by its name: embree, packed, gpu, or gpu-rt, which is gpu with GpuStructures::kDriver. Returns false
-/// for other names.
+/// Chooses a backend by its name: embree, packed, gpu, or gpu-rt, which is gpu with GpuStructures::kDriver. Returns
+/// false for other names.
 bool set_backend(TracerConfig& config, std::string_view name);
 
 /// What tracers of a scene with this config should share as TracerConfig::structures; null if they share nothing.

@@ -91,9 +91,6 @@ public:
   /// Reads such a picture, one entry per pixel.
   virtual void read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao,
                               std::span<float> hit_distance) const = 0;
-
-  /// Whether trace_occlusion() works on this device for any hits or nearest hits.
-  virtual bool traces_occlusion(bool nearest) const = 0;
 };
 
 } // namespace packtrace

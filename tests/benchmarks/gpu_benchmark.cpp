@@ -2,7 +2,8 @@
 // that the device makes itself. Prints JSON. Needs no files but those given; exit code 5 if a hit differs,
 // or if denoised frames differ by more than measure_gpu_frames() allows. With --structures, the driver's acceleration
 // structures trace the same rays; how many hits differ is then a result, not a failure. Usage:
-// gpu_benchmark FILE.ptk... [--size 1920x1080] [--spp 1 64 256] [--repeats 5] [--device NAME] [--only-frames|--structures]
+// gpu_benchmark FILE.ptk... [--size 1920x1080] [--spp 1 64 256] [--repeats 5] [--device NAME]
+// [--only-frames|--structures]
 
 #include <algorithm>
 #include <cmath>
@@ -88,7 +89,8 @@ std::vector<Result> traced(std::span<const Ray> rays, const Query& query) {
 class SceneRun {
 public:
   SceneRun(const std::string& name, const Options& options)
-      : options_(options), file_(BakedFile::open(name)), source_(file_), cache_(options.structures ? std::make_shared<StructureCache>(options.gpu) : nullptr),
+      : options_(options), file_(BakedFile::open(name)), source_(file_),
+        cache_(options.structures ? std::make_shared<StructureCache>(options.gpu) : nullptr),
         tracer_(file_, source_, options.gpu, {}, cache_), rays_(tracer_.scene()) {}
 
   Json run() {
@@ -126,6 +128,8 @@ public:
       for (const uint32_t spp : options_.spp) out["occlusion"].push_back(run_occlusion(order, key, spp));
       out["equality"].push_back(compare_occlusion(order, key));
     }
+    for (const auto& [kernel, values] : rays_.kernel_statistics())
+      for (const auto& [name, value] : values) out["kernels"][kernel][name] = value;
     return out;
   }
 
@@ -263,6 +267,7 @@ private:
 };
 
 int run(Options& options) {
+  options.gpu.statistics = true;
   if (options.structures) options.gpu.structures = GpuStructures::kDriver;
   if (options.exact) options.gpu.arithmetic = GpuArithmetic::kExact;
   uint64_t different = 0;

@@ -36,6 +36,7 @@ struct DeviceTraits {
   bool half_bytes = false;    ///< denormal halves convert exactly
   uint32_t subgroup_size = 0; ///< lanes
   bool partitioned = false;   ///< VK_NV_shader_subgroup_partitioned
+  bool statistics = false;    ///< Kernel::statistics() has values
 };
 
 /// Limits of acceleration structures and ray tracing pipelines; zero unless GpuConfig::structures is kDriver.

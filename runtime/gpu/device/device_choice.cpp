@@ -255,6 +255,15 @@ void Device::create_device() {
     structures.require();
     info.pNext = &structures.addresses;
   }
+  VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR statistics{};
+  statistics.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR;
+  statistics.pNext = const_cast<void*>(info.pNext), statistics.pipelineExecutableInfo = VK_TRUE;
+  traits_.statistics =
+      config_.statistics && has_extension(physical_, VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME);
+  if (traits_.statistics) {
+    extensions.push_back(VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME);
+    info.pNext = &statistics;
+  }
   info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
   info.ppEnabledExtensionNames = extensions.data();
   check(vkCreateDevice(physical_, &info, nullptr, &device_), "vkCreateDevice");

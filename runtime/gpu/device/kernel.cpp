@@ -60,6 +60,7 @@ void Kernel::create_pipeline(std::span<const uint32_t> spirv, std::span<const ui
   info.stage.pName = "main";
   info.stage.pSpecializationInfo = &special;
   info.layout = layout_;
+  if (device_->traits().statistics) info.flags = VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR;
   const VkResult result = vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_);
   vkDestroyShaderModule(device, module, nullptr);
   check(result, "vkCreateComputePipelines");
@@ -78,8 +79,8 @@ void Kernel::record(VkCommandBuffer commands, std::span<const std::byte> push, u
   }
   const uint64_t table = shader_table_->address();
   const VkStridedDeviceAddressRegionKHR generation{table, table_stride_, table_stride_},
-      miss{table + table_stride_, table_stride_, table_stride_}, hit{table + 2 * table_stride_, table_stride_, table_stride_},
-      none{};
+      miss{table + table_stride_, table_stride_, table_stride_},
+      hit{table + 2 * table_stride_, table_stride_, table_stride_}, none{};
   vkCmdTraceRaysKHR(commands, &generation, &miss, &hit, &none, groups_x * kGroupThreads, groups_y, 1);
 }
 
@@ -93,6 +94,38 @@ void Kernel::bind(uint32_t binding, const Buffer& buffer) {
   write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
   write.pBufferInfo = &info;
   vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
+}
+
+std::vector<std::pair<std::string, double>> Kernel::statistics() const {
+  std::vector<std::pair<std::string, double>> out;
+  if (!device_->traits().statistics) return out;
+  const VkDevice device = device_->handle();
+  const VkPipelineInfoKHR pipeline{VK_STRUCTURE_TYPE_PIPELINE_INFO_KHR, nullptr, pipeline_};
+  uint32_t count = 0;
+  check(vkGetPipelineExecutablePropertiesKHR(device, &pipeline, &count, nullptr),
+        "vkGetPipelineExecutablePropertiesKHR");
+  VkPipelineExecutablePropertiesKHR blank{};
+  blank.sType = VK_STRUCTURE_TYPE_PIPELINE_EXECUTABLE_PROPERTIES_KHR;
+  std::vector<VkPipelineExecutablePropertiesKHR> shaders(count, blank);
+  check(vkGetPipelineExecutablePropertiesKHR(device, &pipeline, &count, shaders.data()),
+        "vkGetPipelineExecutablePropertiesKHR");
+  for (uint32_t i = 0; i < count; ++i) {
+    const VkPipelineExecutableInfoKHR info{VK_STRUCTURE_TYPE_PIPELINE_EXECUTABLE_INFO_KHR, nullptr, pipeline_, i};
+    uint32_t values = 0;
+    check(vkGetPipelineExecutableStatisticsKHR(device, &info, &values, nullptr),
+          "vkGetPipelineExecutableStatisticsKHR");
+    VkPipelineExecutableStatisticKHR none{};
+    none.sType = VK_STRUCTURE_TYPE_PIPELINE_EXECUTABLE_STATISTIC_KHR;
+    std::vector<VkPipelineExecutableStatisticKHR> all(values, none);
+    check(vkGetPipelineExecutableStatisticsKHR(device, &info, &values, all.data()),
+          "vkGetPipelineExecutableStatisticsKHR");
+    for (const VkPipelineExecutableStatisticKHR& s : all)
+      out.emplace_back(std::string(shaders[i].name) + ", " + s.name,
+                       s.format == VK_PIPELINE_EXECUTABLE_STATISTIC_FORMAT_FLOAT64_KHR
+                           ? s.value.f64
+                           : static_cast<double>(s.value.u64));
+  }
+  return out;
 }
 
 Kernel::~Kernel() {

@@ -4,6 +4,9 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "runtime/gpu/device/device.h"
 
@@ -41,6 +44,9 @@ public:
 
   /// Binds a buffer, which must outlive the runs of this kernel.
   void bind(uint32_t binding, const Buffer& buffer);
+  /// What the driver's compiler says of the shaders, such as numbers of registers: shader and value, value. Empty
+  /// without DeviceTraits::statistics.
+  std::vector<std::pair<std::string, double>> statistics() const;
   /// Whether it is a ray tracing pipeline.
   bool traces_structures() const { return traces_; }
   /// Binds the acceleration structure of a ray tracing pipeline.
@@ -50,7 +56,6 @@ public:
   void record(VkCommandBuffer commands, std::span<const std::byte> push, uint32_t groups_x, uint32_t groups_y) const;
 
 private:
-
   explicit Kernel(std::shared_ptr<Device> device);
   void create_layout(std::span<const VkDescriptorSetLayoutBinding> bindings, uint32_t push_bytes);
   void create_pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants);

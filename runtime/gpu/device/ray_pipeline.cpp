@@ -60,8 +60,8 @@ Kernel::Kernel(std::shared_ptr<Device> device, std::span<const uint32_t> spirv, 
   for (uint32_t i = 0; i < bindings; ++i) all.push_back({i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, kAll, nullptr});
   for (const uint32_t binding : {kRangesBinding, kInstancesBinding})
     all.push_back({binding, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, kHitStages, nullptr});
-  all.push_back({kStructureBinding, VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR, 1, VK_SHADER_STAGE_RAYGEN_BIT_KHR,
-                 nullptr});
+  all.push_back(
+      {kStructureBinding, VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR, 1, VK_SHADER_STAGE_RAYGEN_BIT_KHR, nullptr});
   create_layout(all, push_bytes);
   create_ray_pipeline(spirv, hit_shaders, constants);
   create_shader_table();
@@ -95,8 +95,10 @@ void Kernel::create_ray_pipeline(std::span<const uint32_t> spirv, const HitShade
   info.groupCount = kGroups, info.pGroups = groups.data();
   info.maxPipelineRayRecursionDepth = 1;
   info.layout = layout_;
-  check(vkCreateRayTracingPipelinesKHR(device_->handle(), VK_NULL_HANDLE, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_),
-        "vkCreateRayTracingPipelinesKHR");
+  if (device_->traits().statistics) info.flags = VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR;
+  check(
+      vkCreateRayTracingPipelinesKHR(device_->handle(), VK_NULL_HANDLE, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_),
+      "vkCreateRayTracingPipelinesKHR");
 }
 
 /// Lays the handles of the shader groups out, each at an address that may begin a table.

@@ -1,11 +1,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Counts the occlusion rays that hit something, for each point, through the driver's structures. Rays are made here; 32
-// neighbouring threads take the same samples of neighbouring points.
+// Counts the occlusion rays that hit something, for each point: of scenes with masks, and through the driver's structures.
+// Rays are made here; 32 neighbouring threads take the same samples of neighbouring points.
 #include "trace.glsl"
 #include "points.glsl"
 
-layout(std430, binding = 10) buffer Counts { uint counts[]; };
+layout(std430, binding = 10) buffer Counts { uint counts[]; }; // the last word: 1 if some ray was not traced
 
 void main() {
   uint parts = (push.sample_count + push.per_thread - 1u) / push.per_thread; // threads of a point
@@ -15,10 +15,12 @@ void main() {
   Point p = read_point(i);
   if (p.pixel == kNoPoint || !(push.tfar > 0.0)) return;
   uint first = (block % parts) * push.per_thread, end = min(first + push.per_thread, push.sample_count), count = 0u;
-  for (uint s = first; s < end; ++s) {
+  uint s = first;
+  for (; s < end; ++s) {
     UnitRay u = unit_ray(p.origin, sample_direction(p, push.first_sample + s), 0.0, push.tfar);
     Best best = Best(0.0, 0.0, 0u, 0u, 0u);
     if (trace(u, best, kOcclusionClass)) ++count;
   }
+  if (s < end) atomicMax(counts[counts.length() - 1], 1u); // the driver ended the loop
   if (count != 0u) atomicAdd(counts[i], count);
 }

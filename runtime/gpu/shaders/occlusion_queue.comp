@@ -5,7 +5,7 @@
 // A thread walks a ray's nodes and puts the leaves it reaches into its subgroup's queue. Once that is long enough, or no
 // ray goes on, the subgroup's lanes set up a leaf each, then decode a corner each, then test a pair of ray and triangle
 // each. Shared memory limits how many subgroups are there at once, so rays and leaves stay in registers and are shuffled.
-// Subgroups have 4 to 32 lanes, and nodes numbers below 2^24.
+// Subgroups have 4 to 32 lanes, and nodes numbers below 2^24. No cluster is masked.
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #extension GL_KHR_shader_subgroup_vote : require
@@ -53,20 +53,23 @@ uint nth_bit(uint mask, uint n) {
   return at + (n >= (mask & 1u) ? 1u : 0u);
 }
 
+const uint kStepTree = 0u, kStepTop = 1u, kEnter = 2u; // what a subgroup does
+const uint kNoPlacement = 0xffffffffu;
+
 // --- a ray's way through the scene, which may stop at any node ---
 struct Way {
   bool in_tree;
   uint first, group, size;  // of the tree: nodes that are left, stack entries
   uint base;                // stack entries of the tree over placements
   uint top_node, top_group; // of the tree over placements
-  uint placement, tree_first, tree_flags;
+  uint next;                // placement to enter; kNoPlacement: none
+  uint tree_first, tree_flags;
 };
 
 bool enter_placement(UnitRay u, uint placement, inout Way way, inout GridRay r) {
   if ((placements[placement].classes_aligned & kOcclusionClass) == 0u) return false;
   TreeRecord tree = trees[placements[placement].tree];
   float pad = (kAnyGraded && (tree.flags & kGraded) != 0u ? kGradedPad : 1.0) * tree.max_coordinate;
-  way.placement = placement;
   way.tree_first = way.first = tree.first_node;
   way.tree_flags = tree.flags;
   way.group = kRootGroup;
@@ -76,7 +79,7 @@ bool enter_placement(UnitRay u, uint placement, inout Way way, inout GridRay r) 
 
 // Returns whether the ray may hit something.
 bool begin_way(UnitRay u, out Way way, inout GridRay top, inout GridRay r) {
-  way = Way(false, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+  way = Way(false, 0u, 0u, 0u, 0u, 0u, 0u, kNoPlacement, 0u, 0u);
   if (scene.placement_count == 0u) return false;
   if (!kManyPlacements) {
     way.in_tree = enter_placement(u, 0u, way, r);
@@ -90,7 +93,7 @@ bool begin_way(UnitRay u, out Way way, inout GridRay top, inout GridRay r) {
 }
 
 // A step in the tree over placements. Returns false at its end.
-bool step_top(UnitRay u, GridRay top, inout Way way, inout GridRay r) {
+bool step_top(GridRay top, inout Way way) {
   if (way.top_group == 0u) {
     if (way.base == 0u) return false;
     --way.base;
@@ -99,7 +102,7 @@ bool step_top(UnitRay u, GridRay top, inout Way way, inout GridRay r) {
   }
   uint child = top_nodes[way.top_node].child[take_slot(way.top_group)];
   if ((child & kTopLeaf) != 0u) {
-    way.in_tree = enter_placement(u, child & ~kTopLeaf, way, r);
+    way.next = child & ~kTopLeaf;
   } else {
     float t[8];
     if (way.top_group != 0u) stack[way.base++] = uvec2(way.top_node, way.top_group);
@@ -221,11 +224,10 @@ void main() {
   UnitRay u;
   GridRay r, top;
   Way way;
-  Best best = Best(0.0, 0.0, 0xffffffffu, 0u, 0u);
   if (LANE == 0u) s_hit[gl_SubgroupID] = 0u;
   sync_shared();
   for (uint guard = 0u; guard < 1000000u; ++guard) { // so that a mistake does not hang the device
-    bool ended = false, masked_hit = false, full = false;
+    bool ended = false, hit = false, full = false;
     // A ray each for lanes that have none, once enough have none.
     uint idle = bitCount(subgroupBallot(alive && !tracing && !pending).x);
     if (idle != 0u && (idle >= push.idle_lanes || !subgroupAny(tracing || pending))) {
@@ -237,14 +239,30 @@ void main() {
       }
     }
     if (!subgroupAny(tracing || pending || ended)) break;
-    bool walking;
+    bool walking, stalled = false;
     do {
       // A lane does not leave a placement while leaves of it wait: they need the ray in its grid.
       walking = tracing && held == 0u && !(kManyPlacements && !way.in_tree && pending);
+      uint action = kStepTree;
+      if (kManyPlacements) { // what most lanes can do; the others wait
+        uint in_tree = bitCount(subgroupBallot(walking && way.in_tree).x);
+        uint entering = bitCount(subgroupBallot(walking && !way.in_tree && way.next != kNoPlacement).x);
+        uint above = bitCount(subgroupBallot(walking && !way.in_tree && way.next == kNoPlacement).x);
+        if (entering > above && entering > in_tree)
+          action = kEnter;
+        else if (above > in_tree)
+          action = kStepTop;
+      }
       if (walking) {
         if (kManyPlacements && !way.in_tree) {
-          tracing = step_top(u, top, way, r);
-          ended = ended || !tracing;
+          if (action == kEnter && way.next != kNoPlacement) {
+            way.in_tree = enter_placement(u, way.next, way, r);
+            way.next = kNoPlacement;
+          } else if (action == kStepTop && way.next == kNoPlacement) {
+            tracing = step_top(top, way);
+            ended = ended || !tracing;
+          }
+        } else if (kManyPlacements && action != kStepTree) {
         } else if (way.group == 0u && way.size == way.base) {
           way.in_tree = false;
           if (!kManyPlacements) {
@@ -268,13 +286,6 @@ void main() {
               if (way.group != 0u) stack[way.size++] = uvec2(way.first, way.group);
               way.first = way.tree_first + n.n1.x;
               way.group = mask;
-            } else if (kAnyMasked && ((clusters[2u * n.n1.y + 1u].z >> 8) & kMaskedCluster) != 0u) {
-              if (trace_leaves(u, r, best, way.placement, n, mask, way.tree_flags, kOcclusionClass)) {
-                tracing = false;
-                way.in_tree = false;
-                masked_hit = true;
-                if (pending) atomicOr(s_hit[gl_SubgroupID], 1u << LANE); else ended = true;
-              }
             } else {
               held = mask;
               held_node = node;
@@ -295,17 +306,19 @@ void main() {
         full = count == room && b != 0u;
       }
       walking = tracing && held == 0u && !(kManyPlacements && !way.in_tree && pending);
-    } while (count < S && !full && subgroupAny(walking) &&
+      // Rays that wait to leave their placements.
+      if (kManyPlacements) stalled = bitCount(subgroupBallot(pending && !walking).x) >= S / 2u;
+    } while (count < S && !full && !stalled && subgroupAny(walking) &&
+
              (push.idle_lanes >= S || bitCount(subgroupBallot(ended && s + 1u < end).x) < push.idle_lanes));
-    bool hit = masked_hit && ended;
-    if (count != 0u && (full || count >= S || !subgroupAny(walking))) {
+    if (count != 0u && (full || stalled || count >= S || !subgroupAny(walking))) {
       sync_shared();
       // Whole subgroups of leaves; the rest waits where rays go on.
       uint ending = subgroupAny(walking) && count >= S ? count - count % S : count;
       for (uint e = 0u; e < ending; e += S) flush_leaves(r, way.tree_flags, e, count);
       uint found = s_hit[gl_SubgroupID], rest = count - ending, entry = 0u;
       bool mine = (tracing || pending) && ((found >> LANE) & 1u) != 0u, stays = false;
-      hit = hit || mine;
+      hit = mine;
       if (LANE < rest) {
         entry = s_queue[queue0 + ending + LANE];
         stays = ((found >> ((entry >> 3) & 31u)) & 1u) == 0u;

@@ -88,6 +88,9 @@ constexpr uint32_t kViewRays[] = {
 constexpr uint32_t kOcclusionNearestRays[] = {
 #include <occlusion_nearest_rays.inc>
 };
+constexpr uint32_t kOcclusionCount[] = {
+#include <occlusion_count.inc>
+};
 constexpr uint32_t kOcclusionCountRays[] = {
 #include <occlusion_count_rays.inc>
 };
@@ -123,6 +126,7 @@ std::span<const uint32_t> trace_closest_rays() { return kTraceClosestRays; }
 std::span<const uint32_t> camera_rays() { return kCameraRays; }
 std::span<const uint32_t> view_rays() { return kViewRays; }
 std::span<const uint32_t> occlusion_nearest_rays() { return kOcclusionNearestRays; }
+std::span<const uint32_t> occlusion_count() { return kOcclusionCount; }
 std::span<const uint32_t> occlusion_count_rays() { return kOcclusionCountRays; }
 std::span<const uint32_t> closest_hit() { return kClosestHit; }
 std::span<const uint32_t> any_hit() { return kAnyHit; }

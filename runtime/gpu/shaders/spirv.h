@@ -17,6 +17,9 @@ std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();
 std::span<const uint32_t> occlusion_image();
 std::span<const uint32_t> occlusion_nearest();
+/// For scenes with masks.
+std::span<const uint32_t> occlusion_count();
+/// For scenes without masks.
 std::span<const uint32_t> occlusion_queue();
 /// For devices with DeviceTraits::partitioned.
 std::span<const uint32_t> occlusion_queue_partitioned();

@@ -243,19 +243,21 @@ bool trace(inout UnitRay u, inout Best best, uint ray_class) {
   float t[8];
   uint group = group_of(pass_top_boxes(top, 0u, t), t);
   for (;;) {
-    if (group == 0u) {
-      if (size == 0u) return false;
-      --size;
-      node = stack[size].x;
-      group = stack[size].y;
-    }
-    if (group == 0u) continue;
-    uint child = top_nodes[node].child[take_slot(group)];
-    if ((child & kTopLeaf) == 0u) {
+    // Rays look for their next placements first, so that those of a subgroup enter them together.
+    uint child = 0u;
+    while ((child & kTopLeaf) == 0u) {
+      if (group == 0u) {
+        if (size == 0u) return false;
+        --size;
+        node = stack[size].x;
+        group = stack[size].y;
+        continue;
+      }
+      child = top_nodes[node].child[take_slot(group)];
+      if ((child & kTopLeaf) != 0u) break;
       if (group != 0u) stack[size++] = uvec2(node, group);
       node = child;
       group = group_of(pass_top_boxes(top, node, t), t);
-      continue;
     }
     // The group that is left waits in its variables, above the stack.
     if (trace_placement(u, best, child & ~kTopLeaf, size, ray_class)) return true;

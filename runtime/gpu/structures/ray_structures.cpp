@@ -17,7 +17,8 @@ constexpr uint64_t kTriangleBytes = 9 * sizeof(float);
 constexpr uint64_t kBatchTriangles = uint64_t{1} << 21; ///< that are decoded at once, unless a structure has more
 constexpr uint32_t kMaxGroups = 65535;                  ///< of a dispatch, on every device
 constexpr VkBuildAccelerationStructureFlagsKHR kBottomFlags =
-    VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR | VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_KHR;
+    VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR |
+    VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_COMPACTION_BIT_KHR;
 
 uint64_t round_up(uint64_t value, uint64_t unit) { return (value + unit - 1) / unit * unit; }
 
@@ -68,9 +69,8 @@ private:
   uint32_t count_ = 0;
 };
 
-VkAccelerationStructureBuildSizesInfoKHR sizes_of(const Device& device,
-                                                  const VkAccelerationStructureBuildGeometryInfoKHR& info,
-                                                  const uint32_t* counts) {
+VkAccelerationStructureBuildSizesInfoKHR
+sizes_of(const Device& device, const VkAccelerationStructureBuildGeometryInfoKHR& info, const uint32_t* counts) {
   VkAccelerationStructureBuildSizesInfoKHR sizes{};
   sizes.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_SIZES_INFO_KHR;
   vkGetAccelerationStructureBuildSizesKHR(device.handle(), VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR, &info,
@@ -248,7 +248,8 @@ double RayStructures::place(std::span<const packed::TracePlacement> placements, 
   for (uint32_t i = 0; i < by_tree.size(); ++i) by_tree[i] = i;
   std::ranges::stable_sort(by_tree, {}, [&](uint32_t i) { return levels[i].tree; });
   for (uint32_t p = 0; p < placements.size(); ++p) {
-    const auto same = std::ranges::equal_range(by_tree, placements[p].tree, {}, [&](uint32_t i) { return levels[i].tree; });
+    const auto same =
+        std::ranges::equal_range(by_tree, placements[p].tree, {}, [&](uint32_t i) { return levels[i].tree; });
     const VkTransformMatrixKHR transform = unit_from_grid(placements[p]);
     for (const uint32_t i : same) {
       VkAccelerationStructureInstanceKHR& instance = placed.emplace_back();

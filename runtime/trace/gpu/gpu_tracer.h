@@ -15,8 +15,8 @@
 namespace packtrace {
 
 /// Traces the packed clusters of a baked file on a GPU; its hits are PackedTracer's, bit for bit (docs/gpu.md). With
-/// GpuStructures::kDriver the driver traces decoded triangles instead, and its rounding decides which triangle a ray hits.
-/// The packed tracer beside it chooses the trees, places instances and resolves hits.
+/// GpuStructures::kDriver the driver traces decoded triangles instead, and its rounding decides which triangle a ray
+/// hits. The packed tracer beside it chooses the trees, places instances and resolves hits.
 class GpuTracer final : public RayTracer, public ViewTracer {
 public:
   /// Keeps references, as PackedTracer does. Throws as PackedTracer and gpu::GpuScene do, and Error(kUnsupported) for
@@ -49,7 +49,6 @@ public:
                                                  const OcclusionPicture& picture, std::shared_ptr<gpu::DeviceAo> reused,
                                                  Progress& progress) const override;
   void read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const override;
-  bool traces_occlusion(bool nearest) const override { return nearest || device_rays_->can_count(); }
   HitSurface resolve(const RayHit& hit) const override { return packed_.resolve(hit); }
   void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) override;
   std::span<const Affine> world_from_object() const override { return packed_.world_from_object(); }

@@ -21,16 +21,16 @@ using StructureKey = std::vector<uint64_t>;
 struct StructureStats {
   uint64_t built = 0, compacted = 0, dropped = 0; ///< structures
   uint64_t built_triangles = 0;
-  double build_ms = 0.0, copy_ms = 0.0;                   ///< on the device
-  uint64_t live = 0;                                      ///< structures
-  uint64_t worst_case_bytes = 0;                          ///< of the live ones, as allocated for their builds
-  uint64_t resident_bytes = 0, peak_bytes = 0;            ///< including structures that wait for release
-  uint64_t allocated_bytes = 0;                           ///< of the blocks that they lie in
+  double build_ms = 0.0, copy_ms = 0.0;        ///< on the device
+  uint64_t live = 0;                           ///< structures
+  uint64_t worst_case_bytes = 0;               ///< of the live ones, as allocated for their builds
+  uint64_t resident_bytes = 0, peak_bytes = 0; ///< including structures that wait for release
+  uint64_t allocated_bytes = 0;                ///< of the blocks that they lie in
 };
 
 /// The bottom-level structures of a scene: built when a tracer needs them, compacted over the following frames by
-/// BlasCompactor, kept as long as a tracer uses them and some frames more. Tracers of the same file share one, so that a
-/// new plan of levels builds only what the last one lacked. All functions may be called from several threads.
+/// BlasCompactor, kept as long as a tracer uses them and some frames more. Tracers of the same file share one, so that
+/// a new plan of levels builds only what the last one lacked. All functions may be called from several threads.
 class StructureCache final : private BlasMemoryBackend {
 public:
   /// Opens the device. Throws as gpu::Device::share() does.

@@ -52,7 +52,7 @@ protected:
   /// @param on_device whether the device is to make the rays
   void expect_same_ao(const AoConfig& config, const SamplePlan& plan, bool on_device = true) const {
     const GpuTracer tracer(baked_.file, baked_.source, config_);
-    EXPECT_EQ(traces_view_occlusion(tracer, config, plan), on_device);
+    EXPECT_EQ(traces_view_occlusion(config, plan), on_device);
     const GBuffer gbuffer = primary(tracer.packed());
     AoFrame expected, ao;
     Progress progress;

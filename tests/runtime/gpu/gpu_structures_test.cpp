@@ -95,8 +95,8 @@ TEST_F(GpuStructuresOnAnyDevice, DecodedTriangles) {
     const GpuTables tables(baked.file, baked.source, tracer, GpuStructures::kDriver);
     const gpu::GpuScene scene(config_, tables.view());
     const auto& device = scene.state().device;
-    const auto kernel = scene.state().make_kernel(gpu::spirv::decode_triangles(), gpu::kSceneBindings + 2,
-                                                  sizeof(gpu::SpanRecord));
+    const auto kernel =
+        scene.state().make_kernel(gpu::spirv::decode_triangles(), gpu::kSceneBindings + 2, sizeof(gpu::SpanRecord));
     const gpu::Buffer ranges = gpu::upload(device, std::as_bytes(tables.ranges()), "ranges");
     kernel->bind(gpu::kSceneBindings, ranges);
     size_t compared = 0, different = 0;
