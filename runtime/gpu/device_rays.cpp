@@ -247,9 +247,10 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watc
   s.make_count_kernels();
   FasterKernel& faster = s.faster[samples.order];
   const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
-    const size_t number = s.queue_kernel ? faster.next() : 0;
+    const uint64_t rays = uint64_t{part.point_count} * part.sample_count;
+    const size_t number = s.queue_kernel ? faster.next(rays) : 0;
     const double ms = s.device->run(number == 0 ? *s.walk_kernel : *s.queue_kernel, push_bytes(part), groups);
-    faster.add(number, uint64_t{part.point_count} * part.sample_count, ms);
+    faster.add(number, rays, ms);
     return ms;
   };
   const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -63,23 +64,33 @@ private:
   uint64_t most_;
 };
 
-/// Chooses between two kernels with the same results by the times of their dispatches.
+/// Chooses between two kernels with the same results by the times of their dispatches. Which one is faster depends on
+/// how many rays a dispatch has.
 class FasterKernel {
 public:
   /// Number of the kernel of the next dispatch. Both have turns at first, and the slower one now and then.
-  size_t next() {
-    const size_t turn = dispatches_++;
+  size_t next(uint64_t rays) {
+    Times& times = times_[std::bit_width(rays)];
+    const size_t turn = times.dispatches++;
     if (turn < kFirstTurns) return turn % 2;
-    const size_t faster = ms_per_ray_[1] < ms_per_ray_[0] ? 1 : 0;
+    const size_t faster = times.ms_per_ray[1] < times.ms_per_ray[0] ? 1 : 0;
     return turn % kTurns == 0 ? 1 - faster : faster;
   }
-  void add(size_t kernel, uint64_t rays, double ms) { ms_per_ray_[kernel] = ms / static_cast<double>(rays); }
+  void add(size_t kernel, uint64_t rays, double ms) {
+    double& known = times_[std::bit_width(rays)].ms_per_ray[kernel];
+    const double now = ms / static_cast<double>(rays);
+    known = known == 0.0 ? now : std::min(now, kForget * known); // a slow one may be the clock's fault
+  }
 
 private:
-  static constexpr size_t kFirstTurns = 6, kTurns = 16;
+  static constexpr size_t kFirstTurns = 6, kTurns = 64;
+  static constexpr double kForget = 1.1;
 
-  std::array<double, 2> ms_per_ray_{}; ///< of the last dispatch
-  size_t dispatches_ = 0;
+  struct Times {
+    std::array<double, 2> ms_per_ray{};
+    size_t dispatches = 0;
+  };
+  std::array<Times, 65> times_; ///< by the number of bits of the number of rays
 };
 
 } // namespace packtrace::gpu
