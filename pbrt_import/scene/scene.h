@@ -146,7 +146,7 @@ struct Scene {
   double time = 0.0;                                ///< time at which all transforms are evaluated
   std::vector<AnimatedTransform> animations;        ///< empty if nothing moves
   std::vector<AnimatedInstance> animated_instances; ///< sorted by instance
-  RigidMotion motion; ///< empty before separate_motion(), which makes it of the animations
+  RigidMotion motion; ///< of glTF files; otherwise separate_motion() makes it of the animations
 
   uint64_t dropped_triangles = 0; ///< repeated or out-of-range index, or non-finite vertex; see the diagnostics
 };

@@ -190,7 +190,17 @@ for (let round = 0; round < 4; ++round) {
 // Where images are compared too: the profile with images as good as glTF-Transform's, which are lossy as well.
 const theirs = await imagePsnr(at("portable.glb"), at("transform_meshopt.glb")), files = ["gltfpack", "transform_meshopt", "transform_draco", "web", "exchange"];
 if (Number.isFinite(theirs)) {
-  run(packtrace, "export", at("ptk"), "-o", at("web_images.glb"), "--profile", "web", "--webp-psnr", String(theirs), "--force", "-q");
+  let low = theirs - 8, high = theirs; // the least limit per image with which all together are as good is in (low, high]
+  const write = async (limit) => {
+    run(packtrace, "export", at("ptk"), "-o", at("web_images.glb"), "--profile", "web", "--webp-psnr", limit.toFixed(2), "--force", "-q");
+    return imagePsnr(at("portable.glb"), at("web_images.glb"));
+  };
+  for (let round = 0; round < 4; ++round) {
+    const limit = (low + high) / 2;
+    if ((await write(limit)) >= theirs) high = limit;
+    else low = limit;
+  }
+  await write(high + 0.005);
   files.splice(4, 0, "web_images");
 }
 run(packtrace, "export", at("ptk"), "-o", at("exchange.glb"), "--instancing", "--normal-bits", "8", "--webp-psnr", "40", "--force", "-q");
