@@ -2,6 +2,7 @@
 
 #include "runtime/trace/embree/embree_rays.h"
 #include "runtime/trace/flush_denormals.h"
+#include "tests/benchmarks/trace_benchmark_rays.h"
 
 namespace packtrace {
 namespace {
@@ -24,7 +25,6 @@ RayHit hit_of(float t, float u, float v, uint32_t instance, uint32_t geometry, u
   static_assert(RTC_INVALID_GEOMETRY_ID == ~0u); // + 1 makes it 0, a valid placement
   return geometry == RTC_INVALID_GEOMETRY_ID ? RayHit{} : RayHit{t, u, v, instance + 1, geometry, primitive};
 }
-bool is_gap(const Ray& ray) { return !(ray.tnear <= ray.tfar); }
 
 void closest_single(const Query& q, std::span<RayHit> hits) {
   EmbreeQuery context(q.flag());

@@ -17,8 +17,6 @@
 namespace packtrace {
 namespace {
 
-bool is_gap(const Ray& ray) { return !(ray.tnear <= ray.tfar); }
-
 class Clock {
 public:
   explicit Clock(bool cpu) : cpu_(cpu) {}

@@ -10,6 +10,9 @@
 
 namespace packtrace {
 
+/// Whether the ray traces nothing, because its interval is empty.
+inline bool is_gap(const Ray& ray) { return !(ray.tnear <= ray.tfar); }
+
 /// Rays as the renderer passes them to a tracer that takes at most 1,024 rays per call, span by span.
 struct RecordedRays {
   std::string_view name;

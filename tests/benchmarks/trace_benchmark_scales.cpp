@@ -38,7 +38,7 @@ struct ScaledSystem {
   std::unique_ptr<RayTracer> tracer;
 };
 
-std::vector<ScaledSystem> make_systems(const TraceInput& input) {
+std::vector<ScaledSystem> make_scaled_systems(const TraceInput& input) {
   std::vector<ScaledSystem> systems;
   systems.push_back({"Embree, rays and triangles in the world", raw_embree(input.source, false)});
   systems.push_back({"Embree robust, likewise", raw_embree(input.source, true)});
@@ -79,7 +79,7 @@ Json measure_scales(const std::string& name, const TraceInputOptions& options, c
   const EmbreeTracer recorder(unscaled.source, {});
   const RecordedFrame frame = record_frame(unscaled.source, recorder, camera, size);
   std::vector<std::vector<RayResults>> expected; // per system and phase
-  for (const ScaledSystem& system : make_systems(unscaled))
+  for (const ScaledSystem& system : make_scaled_systems(unscaled))
     expected.push_back(results_at(frame, recorder.space(), *system.tracer, 1.0));
 
   fmt::print("\n## {} at other scales: hits that are not those at scale 1, of {} / {} / {} rays\n\n"
@@ -89,7 +89,7 @@ Json measure_scales(const std::string& name, const TraceInputOptions& options, c
   for (const double wanted : scales) {
     const double scale = std::exp2(std::round(std::log2(wanted)));
     const TraceInput input(name, bake_trace_scene(scaled(scene, scale), name));
-    const std::vector<ScaledSystem> systems = make_systems(input);
+    const std::vector<ScaledSystem> systems = make_scaled_systems(input);
     for (size_t s = 0; s < systems.size(); ++s) {
       const std::vector<RayResults> results = results_at(frame, recorder.space(), *systems[s].tracer, scale);
       Json row{{"scale", scale}, {"system", systems[s].name}};
