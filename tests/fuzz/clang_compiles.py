@@ -29,10 +29,11 @@ def uses_vectors(path, seen):
 
 
 def clang_command(clang, command):
-    """GCC's command without the launcher, the output and choices of warnings."""
+    """GCC's command without the launcher, the output, choices of warnings and GCC's precompiled headers."""
     words = shlex.split(command)
     words = words[next(i for i, word in enumerate(words) if re.search(r"(^|/)(c|g)\+\+", word)) + 1:]
-    kept = [word for word in words if not re.match(r"-W|-o$|-c$|-fsanitize|.*\.o$", word)]
+    kept = [word for word in words
+            if not re.match(r"-W|-o$|-c$|-fsanitize|-fpch-preprocess$|-include$|.*(\.o|cmake_pch\.hxx)$", word)]
     return [clang, "-fsyntax-only", "-w", "-D_GLIBCXX_ASSERTIONS", *kept]
 
 
