@@ -54,7 +54,8 @@ RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& glob
   const TracerConfig backend = tracer_config(options, globals, file != nullptr);
   if (config.cost_layers && backend.backend != Backend::kPacked)
     throw Error(ErrorKind::kUsage, "--aov visited_nodes and the like require --backend packed");
-  const FrameScene scene{loaded.source.get(), file, backend, motion.moves() ? &motion : nullptr, shows_motion(options)};
+  const FrameScene scene{loaded.source.get(),   file, backend,       motion.moves() ? &motion : nullptr,
+                         shows_motion(options), {},   globals.memory};
   loop = std::make_unique<FrameLoop>(scene, config);
 }
 

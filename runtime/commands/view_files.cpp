@@ -96,6 +96,7 @@ ViewFile load_view_file(const std::string& name, const RenderOptions& options, c
   file.at_rest.source = loaded->scene.source.get();
   file.at_rest.file = baked;
   file.at_rest.backend = tracer_config(options, globals, baked != nullptr);
+  file.at_rest.memory = globals.memory;
   file.moving = file.at_rest;
   if (loaded->motion.moves()) file.moving.motion = &loaded->motion;
   file.moving.deforms = baked != nullptr && !baked->sections().deformation.empty();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <string>
 #include <string_view>
 
@@ -13,7 +12,6 @@
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/frame/pixel_sums.h"
-#include "runtime/frame/shaded_filter.h"
 #include "runtime/frame/surface_layers.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
@@ -67,16 +65,6 @@ glm::dvec2 jitter_offset(uint32_t frame) {
 
 namespace {
 
-/// The bytes of FrameLoop::save() before the denoiser's.
-struct SavedLoop {
-  uint64_t next_number;
-  uint32_t still_frames;
-  uint32_t state_bytes; ///< of SceneState
-  uint64_t mean_bytes;  ///< of RawMean
-  uint64_t rate_bytes;  ///< of AdaptiveRate
-  uint64_t shade_bytes; ///< of ShadedMean
-};
-
 /// The denoiser works where rays are traced.
 AoDenoiser made_denoiser(const FrameConfig& config, const FrameScene& scene) {
   const bool on_gpu = config.denoise && scene.backend.backend == Backend::kGpu;
@@ -97,7 +85,7 @@ void FrameLoop::reset() {
   state_.reset();
   denoiser_.reset();
   adaptive_.clear();
-  shaded_mean_.clear();
+  shading_.clear();
 }
 
 void FrameLoop::configure(const FrameConfig& config) {
@@ -108,68 +96,6 @@ void FrameLoop::configure(const FrameConfig& config) {
   denoised_ = nullptr;
   views_.clear();
   reset();
-}
-
-std::vector<std::byte> FrameLoop::save() const {
-  const std::vector<std::byte> mean = raw_mean_.save(), rate = adaptive_.save(), shade = shaded_mean_.save(),
-                               history = denoiser_.save();
-  const std::vector<uint8_t> state = state_.save();
-  const SavedLoop saved{next_number_, still_frames_, static_cast<uint32_t>(state.size()),
-                        mean.size(),  rate.size(),   shade.size()};
-  std::vector<std::byte> bytes(sizeof(saved));
-  std::memcpy(bytes.data(), &saved, sizeof(saved));
-  for (const std::span<const std::byte> part :
-       {std::as_bytes(std::span(state)), std::span<const std::byte>(mean), std::span<const std::byte>(rate),
-        std::span<const std::byte>(shade), std::span<const std::byte>(history)})
-    bytes.insert(bytes.end(), part.begin(), part.end());
-  return bytes;
-}
-
-void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std::byte> bytes) {
-  SavedLoop saved{};
-  const auto fail = [] { throw Error(ErrorKind::kInput, "the saved state does not belong to these settings"); };
-  if (bytes.size() < sizeof(saved)) fail();
-  std::memcpy(&saved, bytes.data(), sizeof(saved));
-  bytes = bytes.subspan(sizeof(saved));
-  if (saved.state_bytes > bytes.size()) fail();
-  const std::span<const std::byte> state = bytes.first(saved.state_bytes);
-  bytes = bytes.subspan(state.size());
-  if (saved.mean_bytes > bytes.size() || saved.rate_bytes > bytes.size() - saved.mean_bytes ||
-      saved.shade_bytes > bytes.size() - saved.mean_bytes - saved.rate_bytes)
-    fail();
-  if (saved.next_number <= saved.still_frames) fail();
-  const ImageSize shaded =
-      config_.ao_resolution == AoResolution::kFull
-          ? config_.traced_size()
-          : ImageSize{(config_.traced_size().width + 1) / 2, (config_.traced_size().height + 1) / 2};
-  reset();
-  const auto mean = bytes.first(saved.mean_bytes), rate = bytes.subspan(mean.size(), saved.rate_bytes);
-  const auto shade = bytes.subspan(mean.size() + rate.size(), saved.shade_bytes);
-  const auto history = bytes.subspan(mean.size() + rate.size() + shade.size());
-  if ((config_.denoise ? history : mean).empty() || (config_.ao_rate == AoRate::kAdaptive) == rate.empty()) fail();
-  if (!raw_mean_.restore(shaded.pixels(), mean) || !adaptive_.restore(shaded, rate)) fail();
-  if (config_.shades() == shade.empty() || !shaded_mean_.restore(config_.traced_size().pixels(), shade)) fail();
-  denoiser_.restore(shaded, history);
-  // Camera rays are traced again: they depend on the camera alone.
-  layers_.clear();
-  Progress unseen;
-  if (!state_.restore(time_s, {reinterpret_cast<const uint8_t*>(state.data()), state.size()}, report_)) fail();
-  for (still_frames_ = 0;; ++still_frames_) {
-    report_ = {};
-    report_.moved = still_frames_ == 0;
-    if (traces(still_frames_)) {
-      if (still_frames_ > 0) layers_.keep(gbuffer_);
-      const PrimaryCamera view = view_of(camera, still_frames_);
-      trace_camera_rays(view, unseen);
-      layers_.add(gbuffer_, scene().source->materials());
-      if (config_.lod_layers) add_lod_layers(view);
-    }
-    if (still_frames_ == saved.still_frames) break;
-  }
-  if (config_.shades() && config_.denoise) shaded_mean_.keep_surfaces(gbuffer_);
-  camera_ = camera;
-  view_.emplace(camera, config_.traced_size());
-  next_number_ = saved.next_number;
 }
 
 uint64_t FrameLoop::frame_pixels() const {
@@ -193,8 +119,8 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
   const PreviousFrame before{moved_on ? *view_ : view,
                              moved_on ? state_.previous_transforms() : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};
-  if (config_.shades() && !shade_scene_) shade_scene_ = std::make_unique<ShadeScene>(*scene().source);
-  const TextureFilter textures{config_.shades() ? &shade_scene_->textures() : nullptr,
+  const TextureFilter textures{config_.shades() ? &shading_.prepare(*scene().source, scene().memory).textures()
+                                                : nullptr,
                                footprint_px(config_, still_frames_)};
   trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen, textures);
   traced_view_.emplace(view);
@@ -220,20 +146,11 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
 void FrameLoop::shade_frame(bool changed, Progress& progress) {
   Progress unseen([&progress](std::string_view, uint64_t, uint64_t) { progress.advance(0); });
   const Stopwatch shading;
-  shade_scene_->turn_lights(config_.shade.light_turn);
   const ShadeSamples samples{config_.ao.seed, next_number_, ao_radius(config_.ao, traced_source().world_bounds()),
                              footprint_px(config_, still_frames_)};
-  report_.shade_rays = trace_shading(state_.camera_source(), *tracers().front(), *shade_scene_, *traced_view_, gbuffer_,
-                                     config_.shade, samples, shaded_, unseen);
-  changed = changed || lights_turned_;
-  lights_turned_ = false;
-  ShadedHistory history = ShadedHistory::kSamePixels;
-  if (report_.moved || changed) {
-    history = changed ? ShadedHistory::kChanged : ShadedHistory::kMotion;
-    if (!config_.denoise) history = ShadedHistory::kNone;
-  }
-  shaded_mean_.add(shaded_, gbuffer_, history);
-  if (config_.denoise) shaded_mean_.keep_surfaces(gbuffer_);
+  report_.shade_rays = shading_.add(
+      {state_.camera_source(), *tracers().front(), *traced_view_, gbuffer_, samples, report_.moved, changed}, config_,
+      unseen);
   report_.times.shade_s += shading.seconds();
 }
 
@@ -359,16 +276,18 @@ std::span<const float> FrameLoop::accumulated_ao(std::vector<float>& raw_mean, P
 
 /// Writes the shaded layers, without noise if there is a denoiser.
 void FrameLoop::resolve_shading(std::span<const float> ao, RenderedImage& image) {
-  if (!config_.denoise) return packtrace::resolve_shading(config_, shaded_mean_.pixels(), ao, image);
+  if (!config_.denoise) return shading_.resolve(config_, nullptr, ao, image);
   if (still_frames_ > 0) layers_.write_guides(gbuffer_, guides_);
   const GBuffer& mean = still_frames_ > 0 ? guides_ : gbuffer_;
+  std::vector<Vec3> memory;
   const ShadedGuides guides{mean.size,
                             mean.view_z,
                             mean.normal,
                             mean.instance,
-                            layers_.albedos(gbuffer_),
+                            gbuffer_.material,
+                            layers_.albedos(gbuffer_, memory),
                             static_cast<float>(still_frames_) + 1.0f};
-  packtrace::resolve_shading(config_, shaded_mean_.denoised(guides), ao, image);
+  shading_.resolve(config_, &guides, ao, image);
 }
 
 /// Reads samples that stayed on a GPU, if a layer shows them.
@@ -395,7 +314,7 @@ void FrameLoop::resolve_surfaces(RenderedImage& image) const {
 }
 
 void FrameLoop::turn_lights(float degrees) {
-  lights_turned_ = lights_turned_ || config_.shade.light_turn != degrees;
+  if (config_.shade.light_turn != degrees) shading_.turn_lights();
   config_.shade.light_turn = degrees;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -12,11 +11,11 @@
 #include "runtime/denoise/denoiser.h"
 #include "runtime/frame/frame_config.h"
 #include "runtime/frame/frame_report.h"
+#include "runtime/frame/frame_shading.h"
 #include "runtime/frame/mean_layers.h"
 #include "runtime/frame/raw_mean.h"
 #include "runtime/frame/rendered_image.h"
 #include "runtime/frame/scene_state.h"
-#include "runtime/frame/shaded_mean.h"
 #include "runtime/frame/view_layers.h"
 
 namespace packtrace {
@@ -78,7 +77,7 @@ public:
   const SceneSource& traced_source() const { return state_.traced_source(); }
   std::vector<const RayTracer*> tracers() const { return state_.tracers(); }
   /// The lights and materials of shaded views; null before the first frame of one.
-  const ShadeScene* shade_scene() const { return shade_scene_.get(); }
+  const ShadeScene* shade_scene() const { return shading_.scene(); }
   const DetailPlanner* detail() const { return state_.planner(); }
   const AoDenoiser& denoiser() const { return denoiser_; }
   /// Camera rays of the last frame that traced any.
@@ -111,11 +110,8 @@ private:
   AdaptiveRate adaptive_;
   RawMean raw_mean_;
   MeanLayers layers_;
-  std::unique_ptr<ShadeScene> shade_scene_;
-  ShadedFrame shaded_;
-  ShadedMean shaded_mean_;
-  bool lights_turned_ = false; ///< since the last shaded frame
-  RenderedImage lod_layers_;   ///< only its LOD layers
+  FrameShading shading_;
+  RenderedImage lod_layers_; ///< only its LOD layers
   ViewLayers views_;
   const DenoisedAo* denoised_ = nullptr; ///< of the denoiser's last denoise(); null without denoiser
   FrameReport report_;

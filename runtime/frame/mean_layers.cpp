@@ -23,11 +23,11 @@ void for_each_image_row(uint32_t height, const Work& work) {
 /// Makes the layers that are filled as long as the image has pixels, and the others empty.
 void clear_plain_layers(uint32_t layers, RenderedImage& image) {
   const size_t n = image.size.pixels();
-  const auto clear = [&](auto& layer, PlainLayer bit, auto value) {
+  const auto clear = [&]<class T>(std::vector<T>& layer, PlainLayer bit, T value) {
     if (layers & bit)
       layer.assign(n, value);
     else
-      layer = {};
+      layer = std::vector<T>(); // frees the memory, which `= {}` would keep
   };
   image.ao.resize(n), image.coverage.resize(n); // each pixel is written
   clear(image.ao_raw, kAoRawLayer, kInvalidAo);
@@ -123,15 +123,16 @@ void MeanLayers::write_guides(const GBuffer& last, GBuffer& guides) const {
   });
 }
 
-std::vector<Vec3> MeanLayers::albedos(const GBuffer& last) const {
-  std::vector<Vec3> albedos(size_.pixels());
+std::span<const Vec3> MeanLayers::albedos(const GBuffer& last, std::vector<Vec3>& memory) const {
+  if (!kept()) return last.albedo;
+  memory.resize(size_.pixels());
   for_each_image_row(size_.height, [&](uint32_t y) {
     for (size_t i = size_t{y} * size_.width, end = i + size_.width; i < end; ++i) {
       const Sums sum = sums(last, i);
-      albedos[i] = sum.hits > 0.0f ? sum.albedo / sum.hits : Vec3(0.0f);
+      memory[i] = sum.hits > 0.0f ? sum.albedo / sum.hits : Vec3(0.0f);
     }
   });
-  return albedos;
+  return memory;
 }
 
 void MeanLayers::resolve(const FrameConfig& config, const GBuffer& last, std::span<const float> ao,

@@ -27,9 +27,10 @@ public:
   /// @param last of the last add()
   void write_guides(const GBuffer& last, GBuffer& guides) const;
 
-  /// Mean albedo of each traced pixel; black where all frames miss.
+  /// Mean albedo of each traced pixel; black where all frames miss. Those of one frame are read from its G-buffer.
   /// @param last of the last add()
-  std::vector<Vec3> albedos(const GBuffer& last) const;
+  /// @param memory for the result
+  std::span<const Vec3> albedos(const GBuffer& last, std::vector<Vec3>& memory) const;
 
   /// Instance of each traced pixel's first hit; kNoInstance where all frames miss.
   /// @param last of the last add()

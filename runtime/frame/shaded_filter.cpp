@@ -23,13 +23,6 @@ struct Signal {
   float variance = 0.0f;
 };
 
-/// The guides of a pixel.
-struct Guide {
-  Vec3 normal{0.0f};
-  float z = 0.0f, slope = 0.0f; ///< depth, and its change per pixel
-  uint32_t instance = kNoInstance;
-};
-
 struct Grid {
   ImageSize size;
   size_t at(uint32_t x, uint32_t y) const { return size_t{y} * size.width + x; }
@@ -54,56 +47,64 @@ struct Grid {
   }
 };
 
-/// How far two pixels show the same surface, [0, 1].
-float surface_weight(const Guide& a, const Guide& b, float distance_px) {
-  if (a.instance != b.instance) return 0.0f;
-  const float cosine = std::max(glm::dot(a.normal, b.normal), 0.0f);
-  const float c2 = cosine * cosine, c4 = c2 * c2, c8 = c4 * c4, c32 = c8 * c8 * c8 * c8;
-  const float tolerance = 2.0f * a.slope * distance_px + 1e-3f * a.z;
-  const float depth = std::abs(a.z - b.z) / tolerance;
-  return depth < 4.0f ? c32 * std::exp(-depth) : 0.0f;
-}
+/// The surfaces of the pixels.
+class Guides {
+public:
+  Guides(const ShadedGuides& g, const Grid& grid) : g_(g), slopes_(g.size.pixels()) {
+    grid.for_each([&](uint32_t x, uint32_t y) {
+      const size_t i = grid.at(x, y);
+      // The smaller of the changes to both sides: the larger may cross an edge.
+      const auto change = [&](bool before, size_t previous, bool after, size_t next) {
+        const float a = before ? std::abs(g.view_z[previous] - g.view_z[i]) : INFINITY;
+        const float b = after ? std::abs(g.view_z[next] - g.view_z[i]) : INFINITY;
+        const float least = std::min(a, b);
+        return std::isfinite(least) ? least : 0.0f;
+      };
+      slopes_[i] = std::max(change(x > 0, i - 1, x + 1 < g.size.width, i + 1),
+                            change(y > 0, i - g.size.width, y + 1 < g.size.height, i + g.size.width));
+    });
+  }
 
-std::vector<Guide> guides_of(const ShadedGuides& g, const Grid& grid) {
-  std::vector<Guide> guides(g.size.pixels());
-  grid.for_each([&](uint32_t x, uint32_t y) {
-    const size_t i = grid.at(x, y);
-    Guide& guide = guides[i];
-    guide.normal = g.normal[i], guide.z = g.view_z[i], guide.instance = g.instance[i];
-    // The smaller of the changes to both sides: the larger may cross an edge.
-    const auto change = [&](bool before, size_t previous, bool after, size_t next) {
-      const float a = before ? std::abs(g.view_z[previous] - guide.z) : INFINITY;
-      const float b = after ? std::abs(g.view_z[next] - guide.z) : INFINITY;
-      const float least = std::min(a, b);
-      return std::isfinite(least) ? least : 0.0f;
-    };
-    guide.slope = std::max(change(x > 0, i - 1, x + 1 < g.size.width, i + 1),
-                           change(y > 0, i - g.size.width, y + 1 < g.size.height, i + g.size.width));
-  });
-  return guides;
-}
+  bool hits(size_t pixel) const { return g_.instance[pixel] != kNoInstance; }
+
+  /// How far two pixels show the same surface, [0, 1].
+  float weight(size_t a, size_t b, float distance_px) const {
+    if (g_.instance[a] != g_.instance[b] || g_.material[a] != g_.material[b]) return 0.0f;
+    const float cosine = std::max(glm::dot(g_.normal[a], g_.normal[b]), 0.0f);
+    const float c2 = cosine * cosine, c4 = c2 * c2, c8 = c4 * c4, c32 = c8 * c8 * c8 * c8;
+    const float tolerance = 2.0f * slopes_[a] * distance_px + 1e-3f * g_.view_z[a];
+    const float depth = std::abs(g_.view_z[a] - g_.view_z[b]) / tolerance;
+    return depth < 4.0f ? c32 * std::exp(-depth) : 0.0f;
+  }
+
+private:
+  const ShadedGuides& g_;
+  std::vector<float> slopes_; ///< change of depth per pixel
+};
 
 /// Variances of the means of short histories: that of their neighbours' colours.
-void estimate_short_histories(const Grid& grid, std::span<const Guide> guides, std::span<const float> frames,
-                              std::vector<Signal>& signals) {
-  std::vector<float> variances(signals.size());
+/// @param frames length of the history of a pixel
+/// @param other memory, as long as `signals`
+template <class Frames>
+void estimate_short_histories(const Grid& grid, const Guides& guides, const Frames& frames, std::span<Signal> signals,
+                              std::span<Signal> other) {
   grid.for_each([&](uint32_t x, uint32_t y) {
     const size_t p = grid.at(x, y);
-    variances[p] = signals[p].variance;
-    if (frames[p] >= kLongHistory) return;
+    other[p].variance = signals[p].variance;
+    if (frames(p) >= kLongHistory) return;
     float sum = 0.0f, squares = 0.0f, weights = 0.0f;
     for (const uint32_t step : {1u, 2u})
       grid.around(x, y, step, [&](size_t q, int i, int j) {
         const float distance = static_cast<float>(step) * std::hypot(static_cast<float>(i), static_cast<float>(j));
-        const float weight = surface_weight(guides[p], guides[q], distance);
+        const float weight = guides.weight(p, q, distance);
         const float light = luminance(signals[q].colour);
         sum += weight * light, squares += weight * light * light, weights += weight;
       });
     if (!(weights > 0.0f)) return;
     const float mean = sum / weights;
-    variances[p] = std::max(variances[p], std::max(0.0f, squares / weights - mean * mean));
+    other[p].variance = std::max(other[p].variance, std::max(0.0f, squares / weights - mean * mean));
   });
-  for (size_t i = 0; i < signals.size(); ++i) signals[i].variance = variances[i];
+  for (size_t i = 0; i < signals.size(); ++i) signals[i].variance = other[i].variance;
 }
 
 /// The variance of a pixel, smoothed: it is noisy itself.
@@ -116,12 +117,12 @@ float smooth_variance(const Grid& grid, std::span<const Signal> in, uint32_t x, 
   return sum / weights;
 }
 
-void filter_pass(const Grid& grid, std::span<const Guide> guides, uint32_t step, std::span<const Signal> in,
+void filter_pass(const Grid& grid, const Guides& guides, uint32_t step, std::span<const Signal> in,
                  std::span<Signal> out) {
   grid.for_each([&](uint32_t x, uint32_t y) {
     const size_t p = grid.at(x, y);
     out[p] = in[p];
-    if (guides[p].instance == kNoInstance) return;
+    if (!guides.hits(p)) return;
     const float variance = smooth_variance(grid, in, x, y), light = luminance(in[p].colour);
     if (!(variance > 1e-8f * light * light)) return; // there is no noise to remove
     const float scale = 1.0f / (kLuminances * std::sqrt(variance));
@@ -131,7 +132,7 @@ void filter_pass(const Grid& grid, std::span<const Guide> guides, uint32_t step,
       float weight = (i == 0 ? 2.0f : 1.0f) * (j == 0 ? 2.0f : 1.0f);
       if (q != p) {
         const float distance = static_cast<float>(step) * (i != 0 && j != 0 ? 1.4142f : 1.0f);
-        weight *= surface_weight(guides[p], guides[q], distance);
+        weight *= guides.weight(p, q, distance);
         if (weight < 1e-4f) return;
         weight *= std::exp(-std::abs(luminance(in[q].colour) - light) * scale);
       }
@@ -141,11 +142,11 @@ void filter_pass(const Grid& grid, std::span<const Guide> guides, uint32_t step,
   });
 }
 
-/// Filters a signal; the second vector is memory.
-void filter_signal(const Grid& grid, std::span<const Guide> guides, std::span<const float> frames,
-                   std::vector<Signal>& signals, std::vector<Signal>& other) {
-  estimate_short_histories(grid, guides, frames, signals);
-  other.resize(signals.size());
+/// Filters a signal; the second vector is memory of the same length.
+template <class Frames>
+void filter_signal(const Grid& grid, const Guides& guides, const Frames& frames, std::vector<Signal>& signals,
+                   std::vector<Signal>& other) {
+  estimate_short_histories(grid, guides, frames, signals, other);
   for (int pass = 0; pass < kPasses; ++pass) {
     filter_pass(grid, guides, 1u << pass, signals, other);
     std::swap(signals, other);
@@ -163,29 +164,26 @@ float variance_of_mean(Vec3 mean, float square, float frames, float still_frames
 
 void filter_shading(std::span<const ShadedPixel> pixels, const ShadedGuides& g, std::vector<ShadedPixel>& result) {
   const Grid grid{g.size};
-  const std::vector<Guide> guides = guides_of(g, grid);
+  const Guides guides(g, grid);
   result.assign(pixels.begin(), pixels.end());
-  std::vector<Signal> signals(pixels.size()), other;
-  std::vector<float> frames(pixels.size());
+  std::vector<Signal> signals(pixels.size()), other(pixels.size());
   const auto base = [&](size_t i) { return light_base(g.albedo[i]); };
   for (size_t i = 0; i < pixels.size(); ++i) {
     const ShadedPixel& p = pixels[i];
     const float scale = 1.0f / luminance(base(i));
     signals[i] = {p.direct / base(i),
                   variance_of_mean(p.direct, p.direct_square, p.direct_frames, g.still_frames) * scale * scale};
-    frames[i] = p.direct_frames;
   }
-  filter_signal(grid, guides, frames, signals, other);
+  filter_signal(grid, guides, [&](size_t i) { return pixels[i].direct_frames; }, signals, other);
   for (size_t i = 0; i < pixels.size(); ++i)
-    if (guides[i].instance != kNoInstance) result[i].direct = signals[i].colour * base(i);
+    if (guides.hits(i)) result[i].direct = signals[i].colour * base(i);
   for (size_t i = 0; i < pixels.size(); ++i) {
     const ShadedPixel& p = pixels[i];
     signals[i] = {p.specular, variance_of_mean(p.specular, p.specular_square, p.specular_frames, g.still_frames)};
-    frames[i] = p.specular_frames;
   }
-  filter_signal(grid, guides, frames, signals, other);
+  filter_signal(grid, guides, [&](size_t i) { return pixels[i].specular_frames; }, signals, other);
   for (size_t i = 0; i < pixels.size(); ++i)
-    if (guides[i].instance != kNoInstance) result[i].specular = signals[i].colour;
+    if (guides.hits(i)) result[i].specular = signals[i].colour;
 }
 
 } // namespace packtrace

@@ -111,7 +111,8 @@ Image over_background(Image preview, std::span<const float> coverage, const Back
       }
     }
   });
-  return transparent ? with_alpha : preview;
+  if (transparent) return with_alpha;
+  return preview;
 }
 
 } // namespace packtrace

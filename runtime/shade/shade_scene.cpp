@@ -9,7 +9,8 @@
 
 namespace packtrace {
 
-ShadeScene::ShadeScene(const SceneSource& source) : lights_(source), textures_(source) {
+ShadeScene::ShadeScene(const SceneSource& source, const std::optional<MemoryBudget>& memory)
+    : lights_(source), textures_(source, memory) {
   using Floats = std::array<float, 3>;
   using Key = std::tuple<ShadingBits, float, float, Floats, Floats, Floats>;
   const auto key = [](Vec3 v) { return Floats{v.x, v.y, v.z}; };

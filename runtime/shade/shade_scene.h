@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "pbrt_import/base/memory_budget.h"
 #include "runtime/shade/bsdf.h"
 #include "runtime/shade/light_set.h"
 #include "runtime/shade/shadow_rays.h"
@@ -14,7 +16,9 @@ namespace packtrace {
 class ShadeScene {
 public:
   /// @param source must outlive this object
-  explicit ShadeScene(const SceneSource& source);
+  /// @param memory pays for the mip levels
+  /// Throws MemoryError.
+  explicit ShadeScene(const SceneSource& source, const std::optional<MemoryBudget>& memory = {});
 
   const LightSet& lights() const { return lights_; }
   /// LightSet::turn().

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -64,9 +65,25 @@ std::vector<uint8_t> encoded(const LinearImage& image) {
   return rgb;
 }
 
+struct LevelBytes {
+  uint64_t all = 0;    ///< of the levels below the full one
+  uint64_t floats = 0; ///< of two successive ones in linear light, the largest
+};
+
+LevelBytes level_bytes(uint32_t width, uint32_t height) {
+  LevelBytes bytes;
+  while (width > 1 || height > 1) {
+    width = std::max(1u, width / 2), height = std::max(1u, height / 2);
+    const uint64_t texels = uint64_t{width} * height;
+    bytes.all += 3 * texels;
+    if (bytes.floats == 0) bytes.floats = 2 * sizeof(Vec3) * texels;
+  }
+  return bytes;
+}
+
 } // namespace
 
-TexturePyramids::TexturePyramids(const SceneSource& source) {
+TexturePyramids::TexturePyramids(const SceneSource& source, const std::optional<MemoryBudget>& memory) {
   for (const Material& material : source.materials()) {
     const uint32_t texture = material.albedo_texture;
     if (texture == kNoTexture) continue;
@@ -75,6 +92,18 @@ TexturePyramids::TexturePyramids(const SceneSource& source) {
       pyramids_[texture].full = source.texture(texture);
       pyramids_[texture].levels = {pyramids_[texture].full};
     }
+  }
+  constexpr std::string_view kWhat = "mip levels of textures";
+  MemoryReservation floats;
+  if (memory) {
+    uint64_t bytes = 0, largest = 0;
+    for (const Pyramid& pyramid : pyramids_) {
+      const LevelBytes of_texture = level_bytes(pyramid.full.width, pyramid.full.height);
+      bytes += pyramid.levels.empty() ? 0 : of_texture.all;
+      largest = std::max(largest, of_texture.floats);
+    }
+    memory_ = MemoryReservation(*memory, bytes, kWhat);
+    floats = MemoryReservation(*memory, largest, kWhat);
   }
   for (Pyramid& pyramid : pyramids_)
     if (!pyramid.levels.empty()) build(pyramid);

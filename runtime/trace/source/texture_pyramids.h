@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "pbrt_import/base/memory_budget.h"
 #include "runtime/trace/source/scene_source.h"
 
 namespace packtrace {
@@ -13,7 +15,9 @@ namespace packtrace {
 class TexturePyramids {
 public:
   /// @param source must outlive this object
-  explicit TexturePyramids(const SceneSource& source);
+  /// @param memory pays for the levels, and for one in floats while they are made; no limit without one
+  /// Throws MemoryError before anything is made.
+  explicit TexturePyramids(const SceneSource& source, const std::optional<MemoryBudget>& memory = {});
 
   /// Mean of a texture over a parallelogram of texture coordinates, linear sRGB: up to kMaxProbes samples along its
   /// longer axis, each interpolated within and between the two levels whose texels are about as large as the shorter
@@ -37,6 +41,7 @@ private:
   };
   static void build(Pyramid& pyramid);
 
+  MemoryReservation memory_;      ///< of the levels
   std::vector<Pyramid> pyramids_; ///< by texture; without levels if no material shows it
 };
 

@@ -55,6 +55,21 @@ void expect_equal_images(const RenderedImage& a, const RenderedImage& b) {
   EXPECT_EQ(a.shaded, b.shaded);
 }
 
+TEST(FrameLoop, LayersThatNoOneLooksAtTakeNoMemory) {
+  const FrameBench bench;
+  FrameLoop loop(bench.frame_scene(), bench.config_);
+  RenderedImage image;
+  Progress progress;
+  render_still(loop, FrameBench::camera(), 0.0, 1, false, image, progress);
+  EXPECT_EQ(image.normal.size(), bench.config_.size.pixels());
+  FrameConfig few = bench.config_;
+  few.plain_layers = 0;
+  loop.show_layers(few);
+  PictureReport report;
+  loop.resolve(image, report);
+  EXPECT_EQ(image.normal.capacity() + image.shaded.capacity() + image.instance.capacity(), 0u);
+}
+
 TEST(FrameLoop, JitteredStillsConvergeToSupersampledOnes) {
   const FrameBench bench;
   FrameConfig reference = bench.config_;

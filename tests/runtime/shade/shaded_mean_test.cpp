@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/frame/shaded_filter.h"
 #include "runtime/frame/shaded_mean.h"
 
 namespace packtrace {
@@ -113,6 +114,26 @@ TEST(ShadedMean, SamplesThatAreNotFiniteAreDropped) {
     ShadedMean restored;
     EXPECT_TRUE(restored.restore(kWallSize.pixels(), mean.save()));
   }
+}
+
+TEST(ShadedFilter, NeighboursOfAnotherMaterialAreNotMixed) {
+  GBuffer g = wall();
+  std::vector<ShadedPixel> pixels(kWallSize.pixels()), filtered;
+  const auto is_right = [](size_t i) { return i % kWallSize.width >= kWallSize.width / 2; };
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    const float light = is_right(i) ? 2.0f : 1.0f; // with noise that would explain the difference
+    pixels[i].direct = pixels[i].specular = Vec3(light);
+    pixels[i].direct_square = pixels[i].specular_square = light * light + 1.0f;
+    pixels[i].direct_frames = pixels[i].specular_frames = 5.0f;
+  }
+  const ShadedGuides guides{g.size, g.view_z, g.normal, g.instance, g.material, g.albedo};
+  const size_t edge = kWallSize.width / 2 - 1;
+  filter_shading(pixels, guides, filtered);
+  EXPECT_GT(filtered[edge].direct.x, 1.1f);
+  for (size_t i = 0; i < pixels.size(); ++i) g.material[i] = is_right(i);
+  filter_shading(pixels, guides, filtered);
+  EXPECT_NEAR(filtered[edge].direct.x, 1.0f, 1e-4f);
+  EXPECT_NEAR(filtered[edge + 1].specular.x, 2.0f, 1e-4f);
 }
 
 } // namespace

@@ -86,6 +86,21 @@ TEST(TexturePyramid, WideFootprintsAreReadAlongTheirLongerSide) {
   EXPECT_NEAR(pyramids.mean(0, Vec2(32.0f / 64, 0.5f), narrow, wide).x, 0.5f, 1e-3f);
 }
 
+TEST(TexturePyramid, TheMemoryBudgetPaysForTheLevels) {
+  Scene scene;
+  add_textured_floor(scene, noise(256, 128), 1.0f);
+  const FloatSource source(scene);
+  const MemoryBudget enough(1u << 20), little(100000);
+  {
+    const TexturePyramids pyramids(source, enough);
+    EXPECT_EQ(enough.used(), pyramids.bytes());
+    EXPECT_GT(pyramids.bytes(), 256u * 128);
+  }
+  EXPECT_EQ(enough.used(), 0u);
+  EXPECT_THROW(TexturePyramids(source, little), MemoryError);
+  EXPECT_EQ(little.used(), 0u);
+}
+
 TEST(TexturePyramid, SlantedFootprintsAreReadAlongTheirLongerAxis) {
   Scene scene;
   AlbedoTexture stripes; // along the diagonal
