@@ -91,7 +91,7 @@ std::optional<std::string_view> read_stream(std::span<const uint8_t> stream, uin
   StreamReader reader(stream);
   ProxyHeader header{};
   if (!reader.take(&header, 1)) return "it ends in its header";
-  if (header.version != kProxyVersion) return "version";
+  if (header.version != kProxyVersion) return "version, bake the file again";
   std::vector<ProxyRecord> records;
   if (!reader.take(records, header.count)) return "it ends in its records";
   for (size_t i = 0; i < records.size(); ++i) {
