@@ -97,10 +97,12 @@ set(packtrace_public_headers
   runtime/frame/frame_config.h
   runtime/frame/frame_loop.h
   runtime/frame/frame_report.h
+  runtime/frame/frame_shading.h
   runtime/frame/mean_layers.h
   runtime/frame/raw_mean.h
   runtime/frame/rendered_image.h
   runtime/frame/scene_state.h
+  runtime/frame/shaded_filter.h
   runtime/frame/shaded_mean.h
   runtime/frame/still.h
   runtime/frame/view_layers.h
