@@ -105,7 +105,7 @@ void add_tracer_options(CLI::App& verb, RenderOptions& options) {
           "--backend", options.backend,
           "Ray tracer to use. packed traces the compressed clusters (default for .ptk files); gpu does the same on a "
           "GPU with Vulkan and finds the same hits; gpu-rt lets the GPU's driver trace decoded triangles in its own "
-          "acceleration structures, which take about ten times the memory; embree traces floats (default for .pbrt "
+          "acceleration structures, which take 3 to 12 times the memory; embree traces floats (default for .pbrt "
           "scenes, and with --bvh or --fast-edges)")
       ->check(one_of({"packed", "gpu", "gpu-rt", "embree"}));
   verb.add_option(

@@ -248,7 +248,10 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watc
   FasterKernel& faster = s.faster[samples.order];
   const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
     const uint64_t rays = uint64_t{part.point_count} * part.sample_count;
-    const size_t number = s.queue_kernel ? faster.next(rays) : 0;
+    const GpuCounting counting = s.device->config().counting;
+    const size_t number = !s.queue_kernel || counting == GpuCounting::kWalk ? 0
+                          : counting == GpuCounting::kQueue                 ? 1
+                                                                            : faster.next(rays);
     const double ms = s.device->run(number == 0 ? *s.walk_kernel : *s.queue_kernel, push_bytes(part), groups);
     faster.add(number, rays, ms);
     return ms;

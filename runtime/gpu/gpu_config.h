@@ -17,6 +17,13 @@ enum class GpuStructures : uint8_t {
   kDriver, ///< acceleration structures of the Vulkan driver over decoded triangles
 };
 
+/// Which kernel counts occluded rays of packed nodes; their counts are the same.
+enum class GpuCounting : uint8_t {
+  kFaster, ///< the one that took less time of late
+  kWalk,   ///< occlusion_count.comp
+  kQueue,  ///< occlusion_queue.comp, where it can run
+};
+
 /// Choice of a Vulkan device, and limits. The defaults are right for pictures; the rest serves tests.
 struct GpuConfig {
   /// Part of the device's name, in any case. Empty: a discrete GPU, else an integrated or virtual one, but never a
@@ -25,6 +32,7 @@ struct GpuConfig {
   uint64_t memory_limit_bytes = 0; ///< device memory that may be allocated; 0: as much as the device has
   GpuArithmetic arithmetic = GpuArithmetic::kProbed;
   GpuStructures structures = GpuStructures::kPacked;
+  GpuCounting counting = GpuCounting::kFaster;
   double dispatch_ms = 50.0;             ///< time that a dispatch should take at most; work is split accordingly
   bool statistics = false;               ///< kernels know what the compiler says of them, where the driver tells
   bool validation = false;               ///< Vulkan's validation layer, where it is installed

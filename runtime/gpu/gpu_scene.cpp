@@ -221,16 +221,15 @@ void GpuScene::use_structures(std::shared_ptr<StructureMemory> memory, std::span
 
 RayStructures* GpuScene::structures() const { return state_->structures.get(); }
 
-double GpuScene::place_structures(std::span<const packed::TracePlacement> placements,
-                                  std::span<const BottomLevel> levels, std::span<const uint64_t> structures) const {
+void GpuScene::place_structures(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
+                                std::span<const uint64_t> structures) const {
   const std::lock_guard lock(state_->mutex);
-  const double ms = state_->structures->place(placements, levels, structures);
+  state_->structures->place(placements, levels, structures);
   if (state_->closest)
     for (Kernel* kernel : {state_->closest.get(), state_->any.get()}) state_->bind_scene(*kernel);
   else
     state_->make_kernels();
   ++state_->placed;
-  return ms;
 }
 
 void GpuScene::replace_placements(const SceneTables& tables) {

@@ -47,9 +47,9 @@ public:
   void use_structures(std::shared_ptr<StructureMemory> memory, std::span<const RangeRecord> ranges);
   /// Null without use_structures().
   RayStructures* structures() const;
-  /// Traces these structures from now on; see RayStructures::place(). Returns the time of the build in ms.
-  double place_structures(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
-                          std::span<const uint64_t> structures) const;
+  /// Traces these structures from now on; see RayStructures::place().
+  void place_structures(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
+                        std::span<const uint64_t> structures) const;
 
   /// Uploads the placements that changed, and the nodes of the tree over them that did.
   void replace_placements(const SceneTables& tables);

@@ -77,8 +77,8 @@ void BlasCompactor::copy() {
     }
     Entry& e = at->second;
     if (copied > 0 && (copied >= config_.bytes_per_frame || e.compacted > config_.bytes_per_frame - copied)) return;
+    const BlasBuffer target = allocate(e.compacted); // may throw: the entry then waits for another frame
     measured_.pop_front();
-    const BlasBuffer target = allocate(e.compacted);
     backend_.record_copy(blas, e.buffer, target);
     release_later(e.buffer, e.bytes);
     geometries_[e.geometry].now -= e.bytes - e.compacted;

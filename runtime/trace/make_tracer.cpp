@@ -25,6 +25,12 @@ std::unique_ptr<RayTracer> make_gpu_tracer([[maybe_unused]] const Source& source
 
 } // namespace
 
+std::string_view backend_name(const TracerConfig& config) {
+  if (config.backend == Backend::kEmbree) return "embree";
+  if (config.backend == Backend::kPacked) return "packed";
+  return config.gpu.structures == GpuStructures::kDriver ? "gpu-rt" : "gpu";
+}
+
 bool set_backend(TracerConfig& config, std::string_view name) {
   if (name == "embree")
     config.backend = Backend::kEmbree;
@@ -49,7 +55,7 @@ std::shared_ptr<StructureCache> make_structure_cache([[maybe_unused]] const Trac
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config) {
   if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree, config.movers);
   if (file == nullptr)
-    throw Error(ErrorKind::kUnsupported, "backend " + std::string(config.backend == Backend::kGpu ? "gpu" : "packed") +
+    throw Error(ErrorKind::kUnsupported, "backend " + std::string(backend_name(config)) +
                                              " traces baked files only; bake the scene, or use embree");
   if (config.backend == Backend::kGpu) return make_gpu_tracer(source, *file, config);
   return std::make_unique<PackedTracer>(*file, source, chosen_isa(), config.movers);

@@ -16,7 +16,7 @@ class StructureCache;
 enum class Backend : uint8_t {
   kEmbree, ///< Embree over triangles decoded to floats
   kPacked, ///< traces the packed clusters of a baked file directly
-  kGpu,    ///< does the same on a GPU with Vulkan
+  kGpu,    ///< does the same on a GPU with Vulkan, or lets its driver trace (GpuConfig::structures)
 };
 
 struct TracerConfig {
@@ -31,6 +31,8 @@ struct TracerConfig {
 /// Chooses a backend by its name: embree, packed, gpu, or gpu-rt, which is gpu with GpuStructures::kDriver. Returns
 /// false for other names.
 bool set_backend(TracerConfig& config, std::string_view name);
+/// The name for set_backend().
+std::string_view backend_name(const TracerConfig& config);
 
 /// What tracers of a scene with this config should share as TracerConfig::structures; null if they share nothing.
 /// Throws as StructureCache's constructor does.

@@ -3,7 +3,7 @@
 // or if denoised frames differ by more than measure_gpu_frames() allows. With --structures, the driver's acceleration
 // structures trace the same rays; how many hits differ is then a result, not a failure. Usage:
 // gpu_benchmark FILE.ptk... [--size 1920x1080] [--spp 1 64 256] [--repeats 5] [--device NAME]
-// [--only-frames|--structures]
+// [--only-frames] [--structures]
 
 #include <algorithm>
 #include <cmath>

@@ -21,7 +21,7 @@ void copy_bytes(std::byte* to, const std::byte* from, size_t bytes) {
 
 Buffer::Buffer(std::shared_ptr<Device> device, uint64_t bytes, BufferPlace place, const char* what)
     : device_(std::move(device)), bytes_((std::max(bytes, kLeastBytes) + 15) / 16 * 16) {
-  if (bytes_ > device_->limits().maxStorageBufferRange)
+  if (place != BufferPlace::kUnbound && bytes_ > device_->limits().maxStorageBufferRange)
     throw Error(ErrorKind::kUnsupported, "backend gpu: " + std::string(what) + " need " + std::to_string(bytes_) +
                                              " bytes, but kernels of " + device_->name() + " can address " +
                                              std::to_string(device_->limits().maxStorageBufferRange));

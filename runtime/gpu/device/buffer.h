@@ -9,8 +9,9 @@
 namespace packtrace::gpu {
 
 enum class BufferPlace : uint8_t {
-  kDevice, ///< fast for kernels
-  kHost,   ///< mapped; kernels can read and write it
+  kDevice,  ///< fast for kernels
+  kHost,    ///< mapped; kernels can read and write it
+  kUnbound, ///< on the device, for builds of structures: no kernel binds it, so it may have any size
 };
 
 /// A storage buffer. Bytes are not initialised.

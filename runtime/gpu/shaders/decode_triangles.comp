@@ -7,7 +7,7 @@
 layout(local_size_x = 64) in;
 layout(std430, binding = 9) readonly restrict buffer Ranges { RangeRecord ranges[]; };
 layout(std430, binding = 10) writeonly restrict buffer Vertices { float vertices[]; }; // 9 a triangle
-layout(push_constant) uniform Push { SpanRecord span; }; // of ranges; reserved: the first one's geometry begins here
+layout(push_constant) uniform Push { SpanRecord span; }; // of ranges; reserved: number of their geometry's first triangle in `vertices`
 
 void main() {
   RangeRecord range = ranges[span.first + gl_WorkGroupID.x];

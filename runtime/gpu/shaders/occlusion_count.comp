@@ -1,11 +1,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Counts the occlusion rays that hit something, for each point: of scenes with masks, and through the driver's structures.
-// Rays are made here; 32 neighbouring threads take the same samples of neighbouring points.
+// Counts the occlusion rays that hit something, for each point. A thread walks its rays alone, which are made here; 32
+// neighbouring threads take the same samples of neighbouring points.
 #include "trace.glsl"
 #include "points.glsl"
 
-layout(std430, binding = 10) buffer Counts { uint counts[]; }; // the last word: 1 if some ray was not traced
+layout(std430, binding = 10) buffer Counts { uint counts[]; }; // the last word: 1 if a driver ended the loop over samples
 
 void main() {
   uint parts = (push.sample_count + push.per_thread - 1u) / push.per_thread; // threads of a point
@@ -21,6 +21,6 @@ void main() {
     Best best = Best(0.0, 0.0, 0u, 0u, 0u);
     if (trace(u, best, kOcclusionClass)) ++count;
   }
-  if (s < end) atomicMax(counts[counts.length() - 1], 1u); // the driver ended the loop
+  if (s < end) atomicMax(counts[counts.length() - 1], 1u); // Mesa's CPU device ends loops after 65,535 iterations
   if (count != 0u) atomicAdd(counts[i], count);
 }

@@ -263,6 +263,7 @@ void main() {
             ended = ended || !tracing;
           }
         } else if (kManyPlacements && action != kStepTree) {
+          // waits for the others
         } else if (way.group == 0u && way.size == way.base) {
           way.in_tree = false;
           if (!kManyPlacements) {

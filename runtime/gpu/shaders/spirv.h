@@ -17,7 +17,7 @@ std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();
 std::span<const uint32_t> occlusion_image();
 std::span<const uint32_t> occlusion_nearest();
-/// For scenes with masks.
+/// A thread walks its rays alone.
 std::span<const uint32_t> occlusion_count();
 /// For scenes without masks.
 std::span<const uint32_t> occlusion_queue();

@@ -131,11 +131,12 @@ VkTransformMatrixKHR unit_from_grid(const packed::TracePlacement& placement) {
   return out;
 }
 
-void make_room(Buffer& buffer, const std::shared_ptr<Device>& device, uint64_t bytes, BufferPlace place,
+/// Scratch buffers have no contents between builds.
+void make_room(Buffer& scratch, const std::shared_ptr<Device>& device, uint64_t bytes, BufferPlace place,
                const char* what) {
-  if (buffer.bytes() >= bytes && buffer.bytes() > 0) return;
-  buffer = Buffer();
-  buffer = Buffer(device, bytes, place, what);
+  if (scratch.bytes() >= bytes && scratch.bytes() > 0) return;
+  scratch = Buffer();
+  scratch = Buffer(device, bytes, place, what);
 }
 
 } // namespace
@@ -191,7 +192,7 @@ double RayStructures::build_batch(std::span<BottomBuild> builds) {
     handles.push_back(memory_->handle(build.into));
   }
   make_room(vertices_, device, triangles * kTriangleBytes, BufferPlace::kDevice, "decoded triangles");
-  make_room(scratch_, device, scratch_bytes + alignment, BufferPlace::kDevice, "scratch memory of builds");
+  make_room(scratch_, device, scratch_bytes + alignment, BufferPlace::kUnbound, "scratch memory of builds");
   decode_->bind(kSceneBindings + 1, vertices_);
   const uint64_t scratch = round_up(scratch_.address(), alignment);
   std::vector<VkAccelerationStructureBuildGeometryInfoKHR> infos;
@@ -239,8 +240,8 @@ double RayStructures::copy(std::span<const CompactingCopy> copies) {
   });
 }
 
-double RayStructures::place(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
-                            std::span<const StructureNumber> structures) {
+void RayStructures::place(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
+                          std::span<const StructureNumber> structures) {
   const std::shared_ptr<Device>& device = memory_->device();
   std::vector<VkAccelerationStructureInstanceKHR> placed;
   std::vector<InstanceRecord> records;
@@ -273,17 +274,15 @@ double RayStructures::place(std::span<const packed::TracePlacement> placements, 
     throw Error(ErrorKind::kLimitExceeded, "backend gpu-rt: " + std::to_string(placed.size()) +
                                                " instances are more than an acceleration structure may have; use "
                                                "--backend gpu");
-  make_room(instances_, device, records.size() * sizeof records[0], BufferPlace::kDevice, "the instances' table");
-  update(device, instances_, 0, std::as_bytes(std::span(records)));
-  make_room(placed_, device, placed.size() * sizeof placed[0], BufferPlace::kDevice, "placed structures");
-  update(device, placed_, 0, std::as_bytes(std::span(placed)));
+  Buffer new_instances = upload(device, std::as_bytes(std::span(records)), "the instances' table");
+  const Buffer inputs = upload(device, std::as_bytes(std::span(placed)), "placed structures");
 
   VkAccelerationStructureGeometryKHR geometry{};
   geometry.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_KHR;
   geometry.geometryType = VK_GEOMETRY_TYPE_INSTANCES_KHR;
   geometry.geometry.instances = {};
   geometry.geometry.instances.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_INSTANCES_DATA_KHR;
-  geometry.geometry.instances.data.deviceAddress = placed_.address();
+  geometry.geometry.instances.data.deviceAddress = inputs.address();
   VkAccelerationStructureBuildGeometryInfoKHR info{};
   info.sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_GEOMETRY_INFO_KHR;
   info.type = VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR;
@@ -291,19 +290,18 @@ double RayStructures::place(std::span<const packed::TracePlacement> placements, 
   info.geometryCount = 1, info.pGeometries = &geometry;
   const auto count = static_cast<uint32_t>(placed.size());
   const VkAccelerationStructureBuildSizesInfoKHR sizes = sizes_of(*device, info, &count);
-  if (top_ == 0 || top_bytes_ < sizes.accelerationStructureSize) {
-    if (top_ != 0) memory_->destroy(std::exchange(top_, 0));
-    top_ = memory_->create(sizes.accelerationStructureSize, VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR);
-    top_bytes_ = sizes.accelerationStructureSize;
-  }
   const uint64_t alignment = std::max<uint64_t>(device->structure_limits().scratch_alignment, 1);
-  make_room(scratch_, device, sizes.buildScratchSize + alignment, BufferPlace::kDevice, "scratch memory of builds");
-  info.dstAccelerationStructure = memory_->handle(top_);
+  make_room(scratch_, device, sizes.buildScratchSize + alignment, BufferPlace::kUnbound, "scratch memory of builds");
+  const StructureNumber new_top =
+      memory_->create(sizes.accelerationStructureSize, VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR);
+  info.dstAccelerationStructure = memory_->handle(new_top);
   info.scratchData.deviceAddress = round_up(scratch_.address(), alignment);
   const VkAccelerationStructureBuildRangeInfoKHR range{count, 0, 0, 0};
   const VkAccelerationStructureBuildRangeInfoKHR* const ranges = &range;
-  return device->run(
-      [&](VkCommandBuffer commands) { vkCmdBuildAccelerationStructuresKHR(commands, 1, &info, &ranges); });
+  device->run([&](VkCommandBuffer commands) { vkCmdBuildAccelerationStructuresKHR(commands, 1, &info, &ranges); });
+  if (top_ != 0) memory_->destroy(top_);
+  top_ = new_top, top_bytes_ = sizes.accelerationStructureSize;
+  instances_ = std::move(new_instances);
 }
 
 void RayStructures::bind(Kernel& kernel) const {
@@ -312,8 +310,6 @@ void RayStructures::bind(Kernel& kernel) const {
   kernel.bind(memory_->handle(top_));
 }
 
-uint64_t RayStructures::bytes() const {
-  return ranges_.bytes() + instances_.bytes() + placed_.bytes() + scratch_.bytes() + top_bytes_;
-}
+uint64_t RayStructures::bytes() const { return ranges_.bytes() + instances_.bytes() + scratch_.bytes() + top_bytes_; }
 
 } // namespace packtrace::gpu

@@ -12,7 +12,6 @@
 
 namespace packtrace::gpu {
 
-class Commands;
 class GpuScene;
 
 /// Clusters of a placed tree whose triangles the same rays hit: the contents of a bottom-level structure.
@@ -48,7 +47,7 @@ struct CompactingCopy {
 class RayStructures {
 public:
   /// @param scene must outlive this object; its clusters are decoded for builds
-  /// @param ranges by part: the numbers of first triangles ascend
+  /// @param ranges of all parts; within a part, first_triangle ascends
   RayStructures(const GpuScene& scene, std::shared_ptr<StructureMemory> memory, std::span<const RangeRecord> ranges);
   ~RayStructures();
   RayStructures(const RayStructures&) = delete;
@@ -62,10 +61,10 @@ public:
   double build(std::span<BottomBuild> builds);
   double copy(std::span<const CompactingCopy> copies);
 
-  /// Builds the top level. Returns the time on the device in ms.
+  /// Builds the top level. The one before is traced until this returns, also if there is no memory for the new one.
   /// @param structures by bottom level
-  double place(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
-               std::span<const StructureNumber> structures);
+  void place(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
+             std::span<const StructureNumber> structures);
 
   /// Lets a ray tracing pipeline read the top level and the tables.
   void bind(Kernel& kernel) const;
@@ -73,13 +72,11 @@ public:
   uint64_t bytes() const;
 
 private:
-  struct Batch;
-
   double build_batch(std::span<BottomBuild> builds);
 
   const GpuScene& scene_;
   std::shared_ptr<StructureMemory> memory_;
-  Buffer ranges_, instances_, placed_, vertices_, scratch_;
+  Buffer ranges_, instances_, vertices_, scratch_;
   std::unique_ptr<Kernel> decode_;
   StructureNumber top_ = 0;
   uint64_t top_bytes_ = 0;

@@ -26,7 +26,7 @@ StructureMemory::BlockAt StructureMemory::find_room(uint64_t bytes, uint64_t& of
         return block;
       }
   const uint64_t all = std::max(bytes, kBlockBytes);
-  blocks_.push_back({Buffer(device_, all, BufferPlace::kDevice, "acceleration structures"), {}});
+  blocks_.push_back({Buffer(device_, all, BufferPlace::kUnbound, "acceleration structures"), {}});
   allocated_ += all;
   if (all > bytes) blocks_.back().free.emplace(bytes, all - bytes);
   offset = 0;
@@ -54,6 +54,7 @@ void StructureMemory::free_range(BlockAt block, uint64_t offset, uint64_t bytes)
 }
 
 StructureNumber StructureMemory::create(uint64_t bytes, VkAccelerationStructureTypeKHR type) {
+  const std::lock_guard lock(mutex_);
   Structure structure;
   structure.bytes = aligned(std::max<uint64_t>(bytes, 1));
   structure.block = find_room(structure.bytes, structure.offset);
@@ -67,17 +68,31 @@ StructureNumber StructureMemory::create(uint64_t bytes, VkAccelerationStructureT
   const VkAccelerationStructureDeviceAddressInfoKHR address{
       VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_DEVICE_ADDRESS_INFO_KHR, nullptr, structure.handle};
   structure.address = vkGetAccelerationStructureDeviceAddressKHR(device_->handle(), &address);
-  bytes_ += structure.bytes;
   structures_.emplace(++last_, structure);
   return last_;
 }
 
 void StructureMemory::destroy(StructureNumber number) {
+  const std::lock_guard lock(mutex_);
   const Structure structure = structures_.at(number);
   vkDestroyAccelerationStructureKHR(device_->handle(), structure.handle, nullptr);
   free_range(structure.block, structure.offset, structure.bytes);
-  bytes_ -= structure.bytes;
   structures_.erase(number);
+}
+
+VkAccelerationStructureKHR StructureMemory::handle(StructureNumber number) const {
+  const std::lock_guard lock(mutex_);
+  return structures_.at(number).handle;
+}
+
+uint64_t StructureMemory::address(StructureNumber number) const {
+  const std::lock_guard lock(mutex_);
+  return structures_.at(number).address;
+}
+
+uint64_t StructureMemory::allocated_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return allocated_;
 }
 
 StructureMemory::~StructureMemory() {

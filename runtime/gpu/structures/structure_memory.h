@@ -4,7 +4,9 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <unordered_map>
+#include <utility>
 
 #include "runtime/gpu/device/buffer.h"
 
@@ -13,7 +15,7 @@ namespace packtrace::gpu {
 /// Number of an acceleration structure; 0 stands for none.
 using StructureNumber = uint64_t;
 
-/// Acceleration structures of a device, many to a memory allocation. Not for several threads at once.
+/// Acceleration structures of a device, many to a memory allocation. All functions may be called from several threads.
 class StructureMemory {
 public:
   explicit StructureMemory(std::shared_ptr<Device> device) : device_(std::move(device)) {}
@@ -28,12 +30,10 @@ public:
   /// The device must not use it any more.
   void destroy(StructureNumber number);
 
-  VkAccelerationStructureKHR handle(StructureNumber number) const { return structures_.at(number).handle; }
-  uint64_t address(StructureNumber number) const { return structures_.at(number).address; }
-  /// Bytes of all structures.
-  uint64_t bytes() const { return bytes_; }
-  /// Bytes of the allocations that they lie in.
-  uint64_t allocated_bytes() const { return allocated_; }
+  VkAccelerationStructureKHR handle(StructureNumber number) const;
+  uint64_t address(StructureNumber number) const;
+  /// Bytes of the allocations that the structures lie in.
+  uint64_t allocated_bytes() const;
 
 private:
   struct Block {
@@ -51,10 +51,11 @@ private:
   void free_range(BlockAt block, uint64_t offset, uint64_t bytes);
 
   std::shared_ptr<Device> device_;
+  mutable std::mutex mutex_;
   std::list<Block> blocks_;
   std::unordered_map<StructureNumber, Structure> structures_;
   StructureNumber last_ = 0;
-  uint64_t bytes_ = 0, allocated_ = 0;
+  uint64_t allocated_ = 0;
 };
 
 } // namespace packtrace::gpu

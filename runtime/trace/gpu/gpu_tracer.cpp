@@ -63,17 +63,12 @@ GpuTracer::GpuTracer(const BakedFile& file, const LodSource& source, const GpuCo
   upload(config, std::move(cache));
 }
 
-GpuTracer::~GpuTracer() {
-  if (cache_) cache_->give_back(structures_);
-}
-
 void GpuTracer::upload(const GpuConfig& config, std::shared_ptr<StructureCache> cache) {
   scene_ = std::make_unique<gpu::GpuScene>(config, tables_.view());
   if (config.structures == GpuStructures::kDriver) {
-    if (!cache) cache = std::make_shared<StructureCache>(config);
-    scene_->use_structures(cache->memory(), tables_.ranges());
-    structures_ = cache->take(*scene_->structures(), tables_.bottom_levels(), tables_.structure_keys());
-    cache_ = std::move(cache);
+    cache_ = cache ? std::move(cache) : std::make_shared<StructureCache>(config);
+    scene_->use_structures(cache_->memory(), tables_.ranges());
+    structures_ = cache_->take(*scene_->structures(), tables_.bottom_levels(), tables_.structure_keys());
     place_structures();
   }
   device_rays_ = std::make_unique<gpu::DeviceRays>(*scene_);
@@ -81,37 +76,45 @@ void GpuTracer::upload(const GpuConfig& config, std::shared_ptr<StructureCache> 
 }
 
 void GpuTracer::place_structures() const {
-  structures_generation_ = cache_->generation();
+  const uint64_t generation = cache_->generation();
   const packed::KernelScene& scene = packed_.kernel_scene();
   scene_->place_structures({scene.placements, scene.placement_count}, tables_.bottom_levels(),
-                           cache_->structures(structures_));
+                           cache_->structures(structures_.numbers()));
+  structures_generation_ = generation;
 }
 
-/// Begins a frame of the cache.
+/// Begins a frame of the cache. The caller holds device_rays_mutex_, as for all functions of structures: dispatches of
+/// other threads use them.
 void GpuTracer::begin_picture() const {
   if (!cache_) return;
-  const std::lock_guard lock(structures_mutex_);
   cache_->next_frame(*scene_->structures());
+  follow_structures();
 }
 
 /// Places the structures again if the cache has moved some.
 void GpuTracer::follow_structures() const {
-  if (!cache_) return;
-  const std::lock_guard lock(structures_mutex_);
-  if (structures_generation_ != cache_->generation()) place_structures();
+  if (cache_ && structures_generation_ != cache_->generation()) place_structures();
+}
+
+/// Holds the structures where they are while spans of rays are traced. Does nothing for packed nodes.
+std::unique_lock<std::mutex> GpuTracer::lock_structures() const {
+  if (!cache_) return {};
+  std::unique_lock lock(device_rays_mutex_);
+  follow_structures();
+  return lock;
 }
 
 void GpuTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
   assert(hits.size() == rays.size());
-  follow_structures();
+  const std::unique_lock lock = lock_structures();
   scene_->closest({kernel_rays(rays), rays.size()}, ray_class, {kernel_hits(hits), hits.size()});
 }
 
 void GpuTracer::trace_view(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                            const Progress& progress) const {
   assert(hits.size() == rays.size());
+  const std::unique_lock lock = lock_structures();
   begin_picture();
-  follow_structures();
   scene_->closest({kernel_rays(rays), rays.size()}, ray_class, {kernel_hits(hits), hits.size()},
                   [&] { progress.check_cancelled(); });
 }
@@ -126,7 +129,6 @@ std::shared_ptr<gpu::DeviceView> GpuTracer::trace_camera(const PrimaryCamera& ca
   for (uint32_t y = 0; y < size.height; ++y) film[size.width + y] = camera.film_y(y);
   const std::lock_guard lock(device_rays_mutex_);
   begin_picture();
-  follow_structures();
   try {
     return device_rays_->trace_view(view_record(camera, space()), film, ray_class, std::move(reused),
                                     [&](double) { progress.check_cancelled(); });
@@ -222,7 +224,7 @@ void GpuTracer::read_occlusion(const gpu::DeviceAo& picture, std::span<float> ao
 
 void GpuTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<uint8_t> occluded) const {
   assert(occluded.size() == rays.size());
-  follow_structures();
+  const std::unique_lock lock = lock_structures();
   scene_->any({kernel_rays(rays), rays.size()}, ray_class, occluded);
 }
 
@@ -241,9 +243,9 @@ std::vector<TreeBytes> GpuTracer::tree_bytes() const {
     if (const uint32_t tree = traced.tree_of[geometry];
         tree != baked::kNone && traced.records[tree].geometry != baked::kWorldTree)
       trees[tree].geometry = geometry;
-  for (size_t i = 0; i < structures_.size(); ++i) {
+  for (size_t i = 0; i < structures_.numbers().size(); ++i) {
     TreeBytes& tree = trees[tables_.bottom_levels()[i].tree];
-    const auto [worst_case, now] = cache_->bytes(structures_[i]);
+    const auto [worst_case, now] = cache_->bytes(structures_.numbers()[i]);
     tree.worst_case += worst_case, tree.built += now;
   }
   return trees;

@@ -27,7 +27,6 @@ public:
   /// Does the same at the detail of a plan, whose trees are made on the CPU.
   GpuTracer(const BakedFile& file, const LodSource& source, const GpuConfig& config, const Movers& movers = {},
             std::shared_ptr<StructureCache> cache = nullptr);
-  ~GpuTracer() override;
 
   std::string_view name() const override { return cache_ ? "gpu-rt" : "gpu"; }
   std::string_view isa() const override { return device_; }
@@ -67,6 +66,7 @@ private:
   void place_structures() const;
   void begin_picture() const;
   void follow_structures() const;
+  std::unique_lock<std::mutex> lock_structures() const;
   /// Takes the results of points [first, first + count) from the device.
   using TakeSums = std::function<void(size_t first, size_t count)>;
   void trace_parts(const OcclusionPoints& points, const OcclusionSamples& samples, const TakeSums& take,
@@ -77,9 +77,8 @@ private:
   PackedTracer packed_;
   GpuTables tables_;
   std::unique_ptr<gpu::GpuScene> scene_;
-  std::shared_ptr<StructureCache> cache_; ///< null unless the driver traces
-  std::vector<uint32_t> structures_;      ///< of the cache, by bottom level
-  mutable std::mutex structures_mutex_;
+  std::shared_ptr<StructureCache> cache_;      ///< null unless the driver traces
+  TakenStructures structures_;                 ///< of the cache
   mutable uint64_t structures_generation_ = 0; ///< of the cache, when the structures were placed
   std::unique_ptr<gpu::DeviceRays> device_rays_;
   mutable std::mutex device_rays_mutex_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "pbrt_import/base/error.h"
+
 namespace packtrace {
 namespace {
 
@@ -29,25 +31,53 @@ void StructureCache::record_copy(uint32_t blas, BlasBuffer from, BlasBuffer to) 
   entries_[blas].now = entries_[blas].compacted;
 }
 
-void StructureCache::begin_frame(gpu::RayStructures& builder) {
+/// Returns whether there was memory for all copies that the budget allows.
+bool StructureCache::begin_frame(gpu::RayStructures& builder) {
   ++frame_;
   copies_.clear();
-  compactor_->begin_frame();
+  bool fits = true;
+  try {
+    compactor_->begin_frame();
+  } catch (const Error& error) { // what could not be copied stays as it is
+    if (error.kind() != ErrorKind::kLimitExceeded) throw;
+    fits = false;
+  }
   drop_unused();
-  if (copies_.empty()) return;
+  if (copies_.empty()) return fits;
   stats_.copy_ms += builder.copy(copies_);
   stats_.compacted += copies_.size();
   ++generation_;
+  return fits;
+}
+
+/// Adds a structure that is to be built, and returns its number.
+uint32_t StructureCache::add(const StructureKey& key, const gpu::BottomLevel& level) {
+  const uint64_t worst_case = gpu::RayStructures::worst_case_bytes(*memory_->device(), level);
+  if (unused_numbers_.empty()) {
+    unused_numbers_.push_back(static_cast<uint32_t>(entries_.size()));
+    entries_.emplace_back();
+  }
+  const uint32_t number = unused_numbers_.back();
+  entries_[number].worst_case = entries_[number].now = worst_case;
+  levels_[number] = &level;
+  compactor_->add(number, number);
+  unused_numbers_.pop_back();
+  entries_[number].key = &numbers_.emplace(key, number).first->first;
+  return number;
+}
+
+void StructureCache::remove(uint32_t number) {
+  compactor_->remove(number);
+  numbers_.erase(numbers_.find(*entries_[number].key));
+  entries_[number] = Entry{};
+  unused_numbers_.push_back(number);
 }
 
 void StructureCache::drop_unused() {
   for (uint32_t i = 0; i < entries_.size(); ++i) {
-    Entry& entry = entries_[i];
+    const Entry& entry = entries_[i];
     if (entry.key == nullptr || entry.users > 0 || entry.last_used + kKeepFrames >= frame_) continue;
-    compactor_->remove(i);
-    numbers_.erase(numbers_.find(*entry.key));
-    entry = Entry{};
-    unused_numbers_.push_back(i);
+    remove(i);
     ++stats_.dropped;
   }
 }
@@ -55,11 +85,14 @@ void StructureCache::drop_unused() {
 /// Builds what was recorded.
 void StructureCache::build(gpu::RayStructures& builder) {
   std::vector<gpu::BottomBuild> builds;
-  for (const auto& [blas, recorded] : builds_) builds.push_back(recorded);
+  uint64_t triangles = 0;
+  for (const auto& [blas, recorded] : builds_) {
+    builds.push_back(recorded);
+    triangles += recorded.level->triangles();
+  }
   stats_.build_ms += builder.build(builds);
   for (size_t i = 0; i < builds.size(); ++i) entries_[builds_[i].first].compacted = builds[i].compacted_bytes;
-  builds_.clear();
-  levels_.clear();
+  stats_.built += builds.size(), stats_.built_triangles += triangles;
 }
 
 bool StructureCache::settled() const {
@@ -68,43 +101,43 @@ bool StructureCache::settled() const {
   return true;
 }
 
-std::vector<uint32_t> StructureCache::take(gpu::RayStructures& builder, std::span<const gpu::BottomLevel> levels,
-                                           std::span<const StructureKey> keys) {
+TakenStructures StructureCache::take(gpu::RayStructures& builder, std::span<const gpu::BottomLevel> levels,
+                                     std::span<const StructureKey> keys) {
   const std::lock_guard lock(mutex_);
   const bool first = numbers_.empty();
   begin_frame(builder);
+  builds_.clear(), levels_.clear();
   std::vector<uint32_t> taken;
-  for (size_t i = 0; i < levels.size(); ++i) {
-    const auto [at, is_new] = numbers_.try_emplace(keys[i], 0);
-    if (is_new) {
-      if (unused_numbers_.empty()) {
-        unused_numbers_.push_back(static_cast<uint32_t>(entries_.size()));
-        entries_.emplace_back();
-      }
-      const uint32_t number = unused_numbers_.back();
-      unused_numbers_.pop_back();
-      at->second = number;
-      Entry& entry = entries_[number];
-      entry.key = &at->first;
-      entry.worst_case = entry.now = gpu::RayStructures::worst_case_bytes(*memory_->device(), levels[i]);
-      levels_[number] = &levels[i];
-      compactor_->add(number, number);
-      ++stats_.built;
-      stats_.built_triangles += levels[i].triangles();
+  try {
+    for (size_t i = 0; i < levels.size(); ++i) {
+      const auto known = numbers_.find(keys[i]);
+      taken.push_back(known != numbers_.end() ? known->second : add(keys[i], levels[i]));
     }
-    taken.push_back(at->second);
-    ++entries_[at->second].users;
-    entries_[at->second].last_used = frame_;
+    build(builder);
+  } catch (...) {
+    for (const uint32_t number : taken)
+      if (levels_.contains(number)) remove(number);
+    throw;
   }
-  build(builder);
-  if (!first) return taken;
-  while (!settled()) begin_frame(builder);
-  for (uint32_t i = 0; i < config_.frames_in_flight; ++i) begin_frame(builder); // releases the structures copied from
-  return taken;
+  for (const uint32_t number : taken) ++entries_[number].users, entries_[number].last_used = frame_;
+  TakenStructures result(*this, std::move(taken));
+  if (first) settle(builder);
+  return result;
+}
+
+/// Compacts all structures, as far as there is memory, and releases those that were copied.
+void StructureCache::settle(gpu::RayStructures& builder) {
+  while (!settled() && begin_frame(builder)) continue;
+  for (uint32_t i = 0; i < config_.frames_in_flight; ++i) begin_frame(builder);
+}
+
+TakenStructures::~TakenStructures() {
+  if (cache_ == nullptr) return;
+  const std::lock_guard lock(cache_->mutex_);
+  cache_->give_back(numbers_);
 }
 
 void StructureCache::give_back(std::span<const uint32_t> taken) {
-  const std::lock_guard lock(mutex_);
   for (const uint32_t blas : taken) {
     --entries_[blas].users;
     entries_[blas].last_used = frame_;

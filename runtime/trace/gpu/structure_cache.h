@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "runtime/gpu/gpu_config.h"
@@ -28,6 +28,29 @@ struct StructureStats {
   uint64_t allocated_bytes = 0;                ///< of the blocks that they lie in
 };
 
+class StructureCache;
+
+/// The structures that a tracer uses, by bottom level. They go back to the cache with this object.
+class TakenStructures {
+public:
+  TakenStructures() = default;
+  TakenStructures(StructureCache& cache, std::vector<uint32_t> numbers)
+      : cache_(&cache), numbers_(std::move(numbers)) {}
+  ~TakenStructures();
+  TakenStructures(TakenStructures&& other) noexcept { *this = std::move(other); }
+  TakenStructures& operator=(TakenStructures&& other) noexcept {
+    std::swap(cache_, other.cache_);
+    std::swap(numbers_, other.numbers_);
+    return *this;
+  }
+
+  std::span<const uint32_t> numbers() const { return numbers_; }
+
+private:
+  StructureCache* cache_ = nullptr; ///< outlives this object
+  std::vector<uint32_t> numbers_;
+};
+
 /// The bottom-level structures of a scene: built when a tracer needs them, compacted over the following frames by
 /// BlasCompactor, kept as long as a tracer uses them and some frames more. Tracers of the same file share one, so that
 /// a new plan of levels builds only what the last one lacked. All functions may be called from several threads.
@@ -42,13 +65,11 @@ public:
   /// Begins a frame, and builds the structures that are not there yet. The first ones are also compacted.
   /// @param builder of a scene of the file
   /// @param keys by level
-  /// Returns a number for each level, for the functions below. Throws as gpu::RayStructures does.
-  std::vector<uint32_t> take(gpu::RayStructures& builder, std::span<const gpu::BottomLevel> levels,
-                             std::span<const StructureKey> keys);
-  /// The structures are no longer used by the tracer that took them.
-  void give_back(std::span<const uint32_t> taken);
+  /// Throws as gpu::RayStructures does; nothing is taken then.
+  TakenStructures take(gpu::RayStructures& builder, std::span<const gpu::BottomLevel> levels,
+                       std::span<const StructureKey> keys);
 
-  /// Begins a frame: compacts within the budget, and drops what was not used for long.
+  /// Begins a frame: compacts within the budget and as far as there is memory, and drops what was not used for long.
   void next_frame(gpu::RayStructures& builder);
 
   /// Changes whenever structures move.
@@ -60,6 +81,8 @@ public:
   StructureStats stats() const;
 
 private:
+  friend class TakenStructures;
+
   struct Entry {
     const StructureKey* key = nullptr; ///< null: not in use
     uint32_t users = 0;
@@ -74,8 +97,12 @@ private:
   uint64_t compacted_bytes(uint32_t blas) override { return entries_[blas].compacted; }
   void record_copy(uint32_t blas, BlasBuffer from, BlasBuffer to) override;
 
-  void begin_frame(gpu::RayStructures& builder);
+  bool begin_frame(gpu::RayStructures& builder);
+  uint32_t add(const StructureKey& key, const gpu::BottomLevel& level);
+  void remove(uint32_t number);
   void build(gpu::RayStructures& builder);
+  void settle(gpu::RayStructures& builder);
+  void give_back(std::span<const uint32_t> taken);
   void drop_unused();
   bool settled() const;
 

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/gpu/timed_dispatches.h"
 #include "runtime/trace/gpu/gpu_tracer.h"
 #include "tests/runtime/gpu/gpu_test_device.h"
 #include "tests/runtime/trace/packed_scenes.h"
@@ -88,13 +89,23 @@ protected:
   }
 
   void expect_same(const test::BakedScene& baked, uint32_t width, uint32_t height) {
-    const GpuTracer tracer(baked.file, baked.source, config_);
+    for (const GpuCounting counting : {GpuCounting::kQueue, GpuCounting::kWalk}) {
+      GpuConfig config = config_;
+      config.counting = counting;
+      expect_same(baked, config, width, height);
+    }
+  }
+
+  void expect_same(const test::BakedScene& baked, const GpuConfig& config, uint32_t width, uint32_t height) {
+    const GpuTracer tracer(baked.file, baked.source, config);
     gpu::DeviceRays rays(tracer.scene());
     EXPECT_GT(compare_camera(tracer, rays, camera_record(tracer.space(), width, height)), width * height / 10u);
     rays.make_points(1.0f);
-    expect_counts(tracer, rays, samples(gpu::kDirectionOrder, 3, 4, 4));
     expect_counts(tracer, rays, samples(gpu::kRandomOrder, 0, 5, 2)); // three threads a point
-    expect_counts(tracer, rays, samples(gpu::kNetOrder, 7, 2, 16));
+    if (config.counting == GpuCounting::kQueue) {
+      expect_counts(tracer, rays, samples(gpu::kDirectionOrder, 3, 4, 4));
+      expect_counts(tracer, rays, samples(gpu::kNetOrder, 7, 2, 16));
+    }
     for (const std::string& message : tracer.scene().validation_messages()) ADD_FAILURE() << message;
   }
 };
@@ -107,6 +118,14 @@ Scene near_spheres() {
 }
 
 TEST_F(DeviceRaysTest, OnePlacement) { expect_same(test::BakedScene(near_spheres()), 96, 60); }
+
+Scene thicket_without_masks() {
+  Scene scene = test::thicket_scene();
+  for (Material& material : scene.materials) material.flags &= ~(kAlphaMask | kShadowAlphaMask);
+  return scene;
+}
+
+TEST_F(DeviceRaysTest, ManyPlacements) { expect_same(test::BakedScene(thicket_without_masks()), 96, 60); }
 
 TEST_F(DeviceRaysTest, ManyPlacementsWithMasks) { expect_same(test::BakedScene(test::thicket_scene()), 96, 60); }
 
@@ -136,6 +155,24 @@ TEST_F(DeviceRaysTest, ShortDispatchesGiveTheSameCounts) {
   for (int i = 0; i < 6; ++i) rays.count_occluded(samples(gpu::kNetOrder, 0, 4, 2)); // dispatches get shorter
   EXPECT_GT(rays.count_occluded(samples(gpu::kNetOrder, 0, 4, 2)).dispatches, 10u);
   expect_counts(tracer, rays, samples(gpu::kNetOrder, 0, 4, 2));
+}
+
+/// The faster kernel gets nearly all turns, by the size of dispatches, and another one once that takes less time.
+TEST(FasterKernel, FollowsTheTimes) {
+  gpu::FasterKernel choice;
+  const auto turns_of_first = [&](uint64_t rays, double first_ms, double second_ms) {
+    int turns = 0;
+    for (int i = 0; i < 640; ++i) {
+      const size_t number = choice.next(rays);
+      turns += number == 0 ? 1 : 0;
+      choice.add(number, rays, number == 0 ? first_ms : second_ms);
+    }
+    return turns;
+  };
+  EXPECT_GT(turns_of_first(1000, 1.0, 2.0), 620);
+  EXPECT_LT(turns_of_first(1000000, 2.0, 1.0), 20);
+  EXPECT_GT(turns_of_first(1000, 1.0, 2.0), 620);
+  EXPECT_LT(turns_of_first(1000, 4.0, 2.0), 100);
 }
 
 /// A thread that gets no point, in a scene that rays cannot leave, must not hang.
