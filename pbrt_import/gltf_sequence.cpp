@@ -95,6 +95,7 @@ std::vector<MeshSequence> find_gltf_sequences(const ImportResult& imported,
     frames->repeat(count);
     sequences.push_back({mesh, frames, frames_per_second, 0});
   }
+  if (sequences.empty()) throw Error(ErrorKind::kInput, files[0].string() + ": its animation does not deform any mesh");
   return sequences;
 }
 

@@ -22,8 +22,10 @@ ReplacedFile::~ReplacedFile() {
 }
 
 void ReplacedFile::restore() noexcept {
-  std::error_code ignored; // if both are one file still, both names stay
-  if (!kept_.empty()) fs::rename(kept_, file_, ignored);
+  std::error_code error; // if both are one file still, both names stay
+  if (kept_.empty()) return;
+  fs::rename(kept_, file_, error);
+  if (error) kept_.clear(); // the content stays under its temporary name
 }
 
 } // namespace packtrace

@@ -15,7 +15,7 @@ public:
   ReplacedFile(const ReplacedFile&) = delete;
   ReplacedFile& operator=(const ReplacedFile&) = delete;
 
-  /// Puts the content that the file had back in place. Errors are ignored.
+  /// Puts the content that the file had back in place. If that fails, it keeps its temporary name.
   void restore() noexcept;
 
 private:

@@ -49,12 +49,16 @@ Animation::Animation(Document& document) {
   if (document.count("animations") == 0 && !document.context().options.animation) return;
   const Value animation = chosen(document);
   Samplers samplers;
-  const std::string problem = problem_of([&] {
+  const auto report = [&](const std::string& problem, const char* consequence) {
+    if (!problem.empty()) document.context().feed.reporter().error(document.place(), problem + consequence);
+  };
+  const std::string no_channels = problem_of([&] {
     const Value channels = animation.at("channels");
-    for (size_t i = 0; i < channels.size(); ++i) read_channel(document, animation, channels[i], samplers);
+    for (size_t i = 0; i < channels.size(); ++i)
+      report(problem_of([&] { read_channel(document, animation, channels[i], samplers); }),
+             "; the channel is left out");
   });
-  if (!problem.empty())
-    document.context().feed.reporter().error(document.place(), problem + "; the animation ends there");
+  report(no_channels, "; nothing is animated");
 }
 
 Animation::Sampler Animation::read_sampler(Document& document, const Value& sampler) {
@@ -93,6 +97,11 @@ void Animation::read_channel(Document& document, const Value& animation, const V
     read.path = Path::kScale;
   else if (path != "translation")
     target.fail("has an unknown path");
+  if (document.element("nodes", *node).has("matrix") && read.path != Path::kWeights)
+    target.fail("is a node with a matrix");
+  if (const auto others = channels_.find(*node); others != channels_.end())
+    for (const Channel& other : others->second)
+      if (other.path == read.path) target.fail("is the target of another channel, too");
   const uint64_t number = channel.at("sampler").integer();
   const Value sampler = animation.at("samplers")[static_cast<size_t>(number)];
   std::shared_ptr<const Sampler>& shared = samplers[number];
@@ -127,7 +136,9 @@ std::vector<double> Animation::evaluate(const Channel& channel, double time) {
   const size_t key = next - 1;
   const double span = double{times[next]} - double{times[key]}, t = (time - double{times[key]}) / span;
   if (!cubic && channel.path == Path::kRotation) { // rotations are interpolated on the sphere
-    const auto quaternion = [&](size_t k) { return glm::dquat(value(k, 3), value(k, 0), value(k, 1), value(k, 2)); };
+    const auto quaternion = [&](size_t k) {
+      return glm::normalize(glm::dquat(value(k, 3), value(k, 0), value(k, 1), value(k, 2)));
+    };
     const glm::dquat q = glm::slerp(quaternion(key), quaternion(next), t);
     return {q.x, q.y, q.z, q.w};
   }
@@ -199,6 +210,14 @@ void Animation::add_times(uint64_t node, std::vector<double>& times) const {
       times.push_back(double{key});
     }
   }
+}
+
+uint64_t Animation::max_times(uint64_t node) const {
+  const auto found = channels_.find(node);
+  uint64_t count = 2; // and those of the span
+  if (found != channels_.end())
+    for (const Channel& channel : found->second) count += 2 * channel.sampler->times.size();
+  return count;
 }
 
 bool Animation::curved(uint64_t node) const {

@@ -41,6 +41,8 @@ public:
   /// Appends the times between which a node's translation, rotation and scale have no corner and no jump: its keys and,
   /// before the end of each step, the last double.
   void add_times(uint64_t node, std::vector<double>& times) const;
+  /// At least as many as add_times() adds.
+  uint64_t max_times(uint64_t node) const;
   /// Whether a channel of the node's translation, rotation or scale is a cubic spline.
   bool curved(uint64_t node) const;
 

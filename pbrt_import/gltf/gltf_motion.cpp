@@ -40,6 +40,17 @@ bool equal(const MotionKey& a, const MotionKey& b) {
   return a.translation == b.translation && a.rotation == b.rotation && a.scale == b.scale;
 }
 
+/// Whether a key has the limits of files of keys.
+bool is_within_range(const MotionKey& key) {
+  constexpr double kMost = 1e30;
+  const auto small = [](const DVec3& v) {
+    return std::abs(v.x) <= kMost && std::abs(v.y) <= kMost && std::abs(v.z) <= kMost;
+  };
+  const glm::dquat& q = key.rotation;
+  return small(key.translation) && small(key.scale[0]) && small(key.scale[1]) && small(key.scale[2]) &&
+         std::isfinite(q.x + q.y + q.z + q.w);
+}
+
 } // namespace
 
 /// The motion of a mover, and of a thing with a fixed place in it.
@@ -54,13 +65,27 @@ struct NodeTracks::Curve {
       const size_t parent = nodes[at].parent;
       at = parent == kNoNode ? kNoNode : nodes[parent].mover;
     }
-    for (const size_t one : movers) animation.add_times(nodes[one].node, times);
+    for (const size_t one : movers) {
+      reserve((times.size() + animation.max_times(nodes[one].node)) * sizeof(double));
+      animation.add_times(nodes[one].node, times);
+    }
     for (const double end : {animation.span().begin_s, animation.span().end_s}) times.push_back(end);
     std::ranges::sort(times);
     times.erase(std::unique(times.begin(), times.end()), times.end());
-    similar = std::ranges::all_of(times, [&](double t) { return similarity_of(above(t)).has_value(); });
+    similar = std::ranges::all_of(times, [&](double t) {
+      document.context().progress.check_cancelled();
+      return similarity_of(above(t)).has_value();
+    });
     const bool turns_about_itself = inner[3] == DVec3(0.0);
     exact = similar && movers.size() == 1 && !animation.curved(nodes[mover].node) && turns_about_itself;
+  }
+
+  ~Curve() { document.memory().resize(document.memory().bytes() - reserved, "the glTF document's animation"); }
+  Curve(const Curve&) = delete;
+
+  void reserve(uint64_t bytes) {
+    document.memory().resize(document.memory().bytes() - reserved + bytes, "the glTF document's animation");
+    reserved = bytes;
   }
 
   Value node(size_t placed) const { return document.element("nodes", nodes[placed].node); }
@@ -110,20 +135,27 @@ struct NodeTracks::Curve {
   const DAffine& inner;
   std::vector<size_t> movers; ///< the mover, then those above it
   std::vector<double> times;
-  bool similar = false; ///< what is above the mover only turns, moves and scales uniformly at all keys
-  bool exact = false;   ///< nothing needs keys between those of the channels
+  uint64_t reserved = 0; ///< bytes for them
+  bool similar = false;  ///< what is above the mover only turns, moves and scales uniformly at all keys
+  bool exact = false;    ///< nothing needs keys between those of the channels
 };
 
 NodeTracks::NodeTracks(Document& document, const Animation& animation, std::span<const PlacedNode> nodes,
                        const DAffine& world_from_file)
     : document_(document), animation_(animation), nodes_(nodes), world_from_file_(world_from_file) {}
 
-uint32_t NodeTracks::make_track(size_t mover, const DAffine& mover_from_thing) {
+uint32_t NodeTracks::make_track(size_t mover, const DAffine& mover_from_thing, bool needs_inverse) {
   const Curve curve(*this, mover, mover_from_thing);
   MemoryReservation& memory = document_.memory();
   MotionTrack track;
   track.loop = true;
   const auto add = [&](MotionKey key) {
+    const std::string when = " at " + to_text(key.time_s) + " s";
+    if (!is_within_range(key)) curve.node(mover).fail("leaves the range of positions and scales" + when);
+    // The determinant of a rotation is 1.
+    const double volume = glm::determinant(key.scale);
+    if (needs_inverse && !(volume * (track.keys.empty() ? volume : glm::determinant(track.keys.back().scale)) > 0.0))
+      curve.node(mover).fail("is flattened or mirrored" + when);
     if (!track.keys.empty()) join(track.keys.back(), key);
     memory.resize(memory.bytes() + sizeof key, "the glTF document's animation");
     track.keys.push_back(key);
@@ -131,8 +163,10 @@ uint32_t NodeTracks::make_track(size_t mover, const DAffine& mover_from_thing) {
   constexpr double kRounding = 1e-12;
   const DVec3 first = curve.key(curve.times.front()).translation;
   double allowed = kRounding * glm::length(first);
-  for (const double time : curve.times)
+  for (const double time : curve.times) {
+    document_.context().progress.check_cancelled();
     allowed = std::max(allowed, kTolerance * glm::distance(first, curve.key(time).translation));
+  }
   const auto close = [&](const MotionTrack& piece, double time) {
     const DAffine straight = pose(piece, time);
     const MotionKey wanted = curve.key(time);
@@ -173,7 +207,7 @@ std::optional<NodeMotion> NodeTracks::of(size_t placed) {
   const size_t mover = nodes_[placed].mover;
   if (mover == kNoNode) return std::nullopt;
   const auto [found, inserted] = tracks_.try_emplace(mover, kNoTrack);
-  if (inserted) found->second = make_track(mover, DAffine(1.0));
+  if (inserted) found->second = make_track(mover, DAffine(1.0), false);
   if (found->second == kNoTrack) return std::nullopt;
   return NodeMotion{found->second, nodes_[placed].mover_from_node};
 }
@@ -181,7 +215,7 @@ std::optional<NodeMotion> NodeTracks::of(size_t placed) {
 std::optional<uint32_t> NodeTracks::track_with(size_t placed, const DAffine& node_from_thing) {
   const size_t mover = nodes_[placed].mover;
   if (mover == kNoNode) return std::nullopt;
-  const uint32_t track = make_track(mover, compose(nodes_[placed].mover_from_node, node_from_thing));
+  const uint32_t track = make_track(mover, compose(nodes_[placed].mover_from_node, node_from_thing), true);
   return track == kNoTrack ? std::nullopt : std::optional(track);
 }
 

@@ -37,10 +37,11 @@ public:
              const DAffine& world_from_file);
 
   /// Motion of a placed node; none if it stands still. Throws Error(kInput) if it cannot be expressed: under more than
-  /// kMaxMovers moving nodes, or where a non-uniform scale above is zero at a key.
+  /// kMaxMovers moving nodes, where a non-uniform scale above is zero at a key, or with a key beyond 1e30.
   std::optional<NodeMotion> of(size_t placed);
 
-  /// Track of what has a fixed place in a node; none if the node stands still. Throws like of().
+  /// Track of a camera with a fixed place in a node; none if the node stands still. Throws like of(), and where the
+  /// camera is flattened or mirrored at a key.
   std::optional<uint32_t> track_with(size_t placed, const DAffine& node_from_thing);
 
   uint64_t count() const { return count_; } ///< of tracks made so far
@@ -55,7 +56,7 @@ private:
   std::map<size_t, uint32_t> tracks_; ///< of movers; kNoTrack: it keeps its place
   uint64_t count_ = 0;
 
-  uint32_t make_track(size_t mover, const DAffine& mover_from_thing);
+  uint32_t make_track(size_t mover, const DAffine& mover_from_thing, bool needs_inverse);
 };
 
 } // namespace packtrace::gltf

@@ -201,6 +201,41 @@ TEST(GltfMotion, WhatHasNoTrackStandsStill) {
   EXPECT_TRUE(import_time(folder, same, 0.0).scene.motion.empty());
 }
 
+TEST(GltfMotion, WrongChannelsAreLeftOut) {
+  const SceneFolder folder;
+  const GltfChannel up = {0, "translation", "LINEAR", {0, 1}, {0, 0, 0, 0, 5, 0}};
+  GltfBuilder twice = gltf_triangle();
+  add_animation(twice, {up, {0, "translation", "LINEAR", {0, 1}, {0, 0, 0, 9, 9, 9}}});
+  const Imported one = import_time(folder, twice, 0.0);
+  EXPECT_TRUE(one.reported("is the target of another channel, too; the channel is left out")) << one.text();
+  EXPECT_EQ(one.scene.motion.tracks.at(0).keys.back().translation, DVec3(0, 5, 0));
+
+  GltfBuilder matrix = gltf_triangle({{"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}});
+  add_animation(matrix, {up});
+  const Imported still = import_time(folder, matrix, 0.0);
+  EXPECT_TRUE(still.reported("is a node with a matrix; the channel is left out")) << still.text();
+  EXPECT_TRUE(still.scene.motion.empty());
+}
+
+TEST(GltfMotion, KeysBeyondLimitsStandStill) {
+  const SceneFolder folder;
+  GltfBuilder far = gltf_triangle();
+  add_animation(far, {{0, "scale", "LINEAR", {0, 1}, {1, 1, 1, 3e38f, 1, 1}}});
+  const Imported imported = import_time(folder, far, 0.0);
+  EXPECT_TRUE(imported.reported("leaves the range of positions and scales at 1 s; the node stands still"))
+      << imported.text();
+  EXPECT_TRUE(imported.scene.motion.empty());
+
+  GltfBuilder camera = gltf_triangle();
+  camera.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1.0}}}}};
+  camera.node({{"camera", 0}});
+  add_animation(camera, {{1, "scale", "LINEAR", {0, 1, 2}, {1, 1, 1, 0, 1, 1, 1, 1, 1}}});
+  const Imported flat = import_time(folder, camera, 0.0);
+  EXPECT_TRUE(flat.reported("is flattened or mirrored at 1 s; the camera stands still")) << flat.text();
+  EXPECT_EQ(flat.scene.cameras.size(), 1u);
+  EXPECT_TRUE(flat.scene.motion.empty());
+}
+
 TEST(GltfMotion, KeysAreCountedAsMemory) {
   const SceneFolder folder;
   GltfBuilder gltf = gltf_triangle();
