@@ -25,7 +25,8 @@ SceneState::SceneState(const FrameScene& scene, const DetailConfig& detail) : sc
   if (meshes_ && meshes_->empty()) meshes_.reset();
   if (meshes_ && scene_.backend.backend != Backend::kPacked)
     throw Error(ErrorKind::kUnsupported, "deforming meshes require backend packed");
-  if (!scene_.backend.structures && scene_.file != nullptr) scene_.backend.structures = make_structure_cache(scene_.backend);
+  if (!scene_.backend.structures && scene_.file != nullptr)
+    scene_.backend.structures = make_structure_cache(scene_.backend);
   const auto* packed = dynamic_cast<const PackedSource*>(scene_.source);
   if (scene_.file != nullptr && packed != nullptr) {
     levels_ = std::make_unique<InstanceLevels>(*scene_.file);
