@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "runtime/commands/cli_support.h"
+#include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
 
 namespace packtrace {
