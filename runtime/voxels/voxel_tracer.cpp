@@ -94,4 +94,8 @@ PACKTRACE_AVX2_CLONES std::optional<VoxelHit<float>> VoxelTracer::first_hit(glm:
   return trace<float>(*stream_, origin, direction, t_min, t_max);
 }
 
+bool VoxelTracer::occluded(glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) const {
+  return first_hit(origin, direction, t_min, t_max).has_value();
+}
+
 } // namespace packtrace

@@ -35,9 +35,7 @@ public:
   /// In floats, as shaders compute it.
   std::optional<VoxelHit<float>> first_hit(glm::vec3 origin, glm::vec3 direction, float t_min, float t_max) const;
 
-  bool occluded(glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) const {
-    return first_hit(origin, direction, t_min, t_max).has_value();
-  }
+  bool occluded(glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) const;
 
   const OccupancyStream& stream() const { return *stream_; }
 
