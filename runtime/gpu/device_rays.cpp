@@ -16,7 +16,7 @@
 namespace packtrace::gpu {
 namespace {
 
-constexpr uint32_t kThreads = 64; ///< of a workgroup
+constexpr uint32_t kThreads = Kernel::kGroupThreads;
 constexpr uint32_t kMinLanes = 4, kMaxLanes = 32, kMaxQueueNodes = 1u << 24;
 constexpr uint64_t kMaxPoints = uint64_t{1} << 31;
 constexpr uint32_t kFirstBinding = kSceneBindings;

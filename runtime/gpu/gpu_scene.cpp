@@ -13,7 +13,7 @@ namespace packtrace::gpu {
 namespace {
 
 constexpr uint32_t kRaysBinding = kSceneBindings, kResultsBinding = kSceneBindings + 1, kBindings = kSceneBindings + 2;
-constexpr uint32_t kGroupSize = 64;
+constexpr uint32_t kGroupSize = Kernel::kGroupThreads;
 constexpr uint32_t kLeafCorners = 48;             ///< most corners of a leaf, which a subgroup decodes together
 constexpr uint32_t kMaxRays = 65535 * kGroupSize; ///< of a dispatch
 constexpr uint64_t kPayloadPadding = 16;          ///< kernels read three words from a field's first on

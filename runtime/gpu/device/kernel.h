@@ -22,7 +22,7 @@ struct HitShaders {
 /// A compute or ray tracing pipeline and the buffers that it reads and writes.
 class Kernel {
 public:
-  static constexpr uint32_t kGroupThreads = 64; ///< of a group of a ray tracing pipeline
+  static constexpr uint32_t kGroupThreads = 64; ///< rays of a group of kernels that have a thread per ray
   /// Bindings of ray tracing pipelines: two storage buffers that hit shaders read, and the acceleration structure.
   static constexpr uint32_t kRangesBinding = 12, kInstancesBinding = 13, kStructureBinding = 14;
 

@@ -120,9 +120,13 @@ TakenStructures StructureCache::take(gpu::RayStructures& builder, std::span<cons
     throw;
   }
   for (const uint32_t number : taken) ++entries_[number].users, entries_[number].last_used = frame_;
-  TakenStructures result(*this, std::move(taken));
-  if (first) settle(builder);
-  return result;
+  try {
+    if (first) settle(builder);
+  } catch (...) {
+    give_back(taken);
+    throw;
+  }
+  return {*this, std::move(taken)};
 }
 
 /// Compacts all structures, as far as there is memory, and releases those that were copied.
