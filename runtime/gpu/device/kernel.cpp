@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "runtime/gpu/device/buffer.h"
+#include "runtime/gpu/device/shader_stages.h"
 
 namespace packtrace::gpu {
 
@@ -40,30 +41,14 @@ void Kernel::create_layout(std::span<const VkDescriptorSetLayoutBinding> binding
 }
 
 void Kernel::create_pipeline(std::span<const uint32_t> spirv, std::span<const uint32_t> constants) {
-  const VkDevice device = device_->handle();
-  VkShaderModuleCreateInfo code{};
-  code.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-  code.codeSize = spirv.size_bytes();
-  code.pCode = spirv.data();
-  VkShaderModule module = VK_NULL_HANDLE;
-  check(vkCreateShaderModule(device, &code, nullptr, &module), "vkCreateShaderModule");
-  std::vector<VkSpecializationMapEntry> entries;
-  for (uint32_t i = 0; i < constants.size(); ++i)
-    entries.push_back({i, i * static_cast<uint32_t>(sizeof(uint32_t)), sizeof(uint32_t)});
-  const VkSpecializationInfo special{static_cast<uint32_t>(entries.size()), entries.data(), constants.size_bytes(),
-                                     constants.data()};
+  ShaderStages stages(*device_, constants);
   VkComputePipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
-  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = module;
-  info.stage.pName = "main";
-  info.stage.pSpecializationInfo = &special;
+  info.stage = stages.make(VK_SHADER_STAGE_COMPUTE_BIT, spirv);
   info.layout = layout_;
   if (device_->traits().statistics) info.flags = VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR;
-  const VkResult result = vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_);
-  vkDestroyShaderModule(device, module, nullptr);
-  check(result, "vkCreateComputePipelines");
+  check(vkCreateComputePipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr, &pipeline_),
+        "vkCreateComputePipelines");
 }
 
 void Kernel::record(VkCommandBuffer commands, std::span<const std::byte> push, uint32_t groups_x,

@@ -7,36 +7,13 @@
 
 #include "runtime/gpu/device/buffer.h"
 #include "runtime/gpu/device/kernel.h"
+#include "runtime/gpu/device/shader_stages.h"
 
 namespace packtrace::gpu {
 namespace {
 
 constexpr VkShaderStageFlags kHitStages = VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR | VK_SHADER_STAGE_ANY_HIT_BIT_KHR;
 constexpr uint32_t kGroups = 3; ///< of shaders: ray generation, miss, hit
-
-/// Shader modules that are destroyed once the pipeline exists.
-class Modules {
-public:
-  explicit Modules(VkDevice device) : device_(device) {}
-  ~Modules() {
-    for (const VkShaderModule module : all_) vkDestroyShaderModule(device_, module, nullptr);
-  }
-  Modules(const Modules&) = delete;
-
-  VkShaderModule make(std::span<const uint32_t> spirv) {
-    VkShaderModuleCreateInfo code{};
-    code.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-    code.codeSize = spirv.size_bytes(), code.pCode = spirv.data();
-    VkShaderModule module = VK_NULL_HANDLE;
-    check(vkCreateShaderModule(device_, &code, nullptr, &module), "vkCreateShaderModule");
-    all_.push_back(module);
-    return module;
-  }
-
-private:
-  VkDevice device_;
-  std::vector<VkShaderModule> all_;
-};
 
 VkRayTracingShaderGroupCreateInfoKHR group_of(uint32_t general, uint32_t closest, uint32_t any) {
   VkRayTracingShaderGroupCreateInfoKHR group{};
@@ -69,23 +46,11 @@ Kernel::Kernel(std::shared_ptr<Device> device, std::span<const uint32_t> spirv, 
 
 void Kernel::create_ray_pipeline(std::span<const uint32_t> spirv, const HitShaders& hit_shaders,
                                  std::span<const uint32_t> constants) {
-  Modules modules(device_->handle());
-  std::vector<VkSpecializationMapEntry> entries;
-  for (uint32_t i = 0; i < constants.size(); ++i)
-    entries.push_back({i, i * static_cast<uint32_t>(sizeof(uint32_t)), sizeof(uint32_t)});
-  const VkSpecializationInfo special{static_cast<uint32_t>(entries.size()), entries.data(), constants.size_bytes(),
-                                     constants.data()};
-  std::array<VkPipelineShaderStageCreateInfo, 4> stages{};
-  const std::pair<VkShaderStageFlagBits, std::span<const uint32_t>> shaders[] = {
-      {VK_SHADER_STAGE_RAYGEN_BIT_KHR, spirv},
-      {VK_SHADER_STAGE_MISS_BIT_KHR, hit_shaders.miss},
-      {VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR, hit_shaders.closest},
-      {VK_SHADER_STAGE_ANY_HIT_BIT_KHR, hit_shaders.any}};
-  for (size_t i = 0; i < stages.size(); ++i) {
-    stages[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    stages[i].stage = shaders[i].first, stages[i].module = modules.make(shaders[i].second);
-    stages[i].pName = "main", stages[i].pSpecializationInfo = &special;
-  }
+  ShaderStages shaders(*device_, constants);
+  const std::array stages = {shaders.make(VK_SHADER_STAGE_RAYGEN_BIT_KHR, spirv),
+                             shaders.make(VK_SHADER_STAGE_MISS_BIT_KHR, hit_shaders.miss),
+                             shaders.make(VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR, hit_shaders.closest),
+                             shaders.make(VK_SHADER_STAGE_ANY_HIT_BIT_KHR, hit_shaders.any)};
   const std::array<VkRayTracingShaderGroupCreateInfoKHR, kGroups> groups = {
       group_of(0, VK_SHADER_UNUSED_KHR, VK_SHADER_UNUSED_KHR), group_of(1, VK_SHADER_UNUSED_KHR, VK_SHADER_UNUSED_KHR),
       group_of(VK_SHADER_UNUSED_KHR, 2, 3)};
