@@ -1,19 +1,31 @@
 #include "pbrt_import/base/replaced_file.h"
 
-#include <system_error>
 #include <utility>
 
+#include <fcntl.h>
+#include <sys/file.h>
+
+#include "pbrt_import/base/file_error.h"
 #include "pbrt_import/base/output_file.h"
 
 namespace packtrace {
 
 namespace fs = std::filesystem;
 
-ReplacedFile::ReplacedFile(fs::path file) : file_(std::move(file)) {
-  const fs::path name = new_temporary_name(file_.has_parent_path() ? file_.parent_path() : fs::path("."));
+ReplacedFile::ReplacedFile(fs::path file, Link& link) : file_(std::move(file)) {
   std::error_code error;
-  fs::create_hard_link(file_, name, error);
-  if (!error) kept_ = name;
+  if (!fs::exists(fs::symlink_status(file_, error))) return;
+  const fs::path name = new_temporary_name(file_.has_parent_path() ? file_.parent_path() : fs::path("."));
+  link(file_, name, error);
+  if (error) fs::copy_file(file_, name, error);
+  if (error) {
+    std::error_code ignored; // a part of the copy may be there
+    fs::remove(name, ignored);
+    throw FileError(ErrorKind::kIo, file_, "its content cannot be kept while it is replaced: " + error.message());
+  }
+  kept_ = name;
+  lock_ = Descriptor(open(kept_.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  if (lock_.valid()) flock(lock_.get(), LOCK_SH | LOCK_NB);
 }
 
 ReplacedFile::~ReplacedFile() {

@@ -1,15 +1,22 @@
 #pragma once
 
 #include <filesystem>
+#include <system_error>
+
+#include "pbrt_import/base/regular_file.h"
 
 namespace packtrace {
 
-/// Keeps the content of a file that is about to be replaced, under a temporary name beside it (a hard link). File
-/// systems without hard links keep nothing.
+/// Keeps the content of a file that is about to be replaced, under a temporary name beside it: a hard link, or a copy
+/// where the file system has none.
 class ReplacedFile {
 public:
+  using Link = void(const std::filesystem::path& file, const std::filesystem::path& name, std::error_code& error);
+
   /// @param file not a symbolic link; nothing is kept of a file that does not exist
-  explicit ReplacedFile(std::filesystem::path file);
+  /// @param link makes the hard link
+  /// Throws Error(kIo), which names the file, if it can be neither linked nor copied.
+  explicit ReplacedFile(std::filesystem::path file, Link& link = std::filesystem::create_hard_link);
   /// Removes the temporary name.
   ~ReplacedFile();
   ReplacedFile(const ReplacedFile&) = delete;
@@ -21,6 +28,7 @@ public:
 private:
   const std::filesystem::path file_;
   std::filesystem::path kept_; ///< empty: nothing is kept
+  Descriptor lock_;            ///< of the kept name, so that no other process takes it for a stale file
 };
 
 } // namespace packtrace

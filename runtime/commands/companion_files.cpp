@@ -34,12 +34,12 @@ void CompanionFiles::write(std::span<const ExportedFile> files, Progress& progre
     std::error_code error; // OutputFile reports a folder that cannot be made
     if (path.parent_path() != folder_ && fs::create_directory(path.parent_path(), error))
       created_.push_back(path.parent_path());
-    const bool existed = fs::exists(fs::symlink_status(path, error));
     OutputFile output(path, force_);
+    const bool existed = fs::exists(fs::symlink_status(output.target(), error));
     output.write(file.bytes);
     if (existed) replaced_.push_back(std::make_unique<ReplacedFile>(output.target()));
     output.commit();
-    if (!existed) created_.push_back(path);
+    if (!existed) created_.push_back(output.target());
   }
 }
 

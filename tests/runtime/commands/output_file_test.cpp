@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/base/replaced_file.h"
 #include "runtime/commands/json_output.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/temporary_folder.h"
@@ -213,6 +214,31 @@ TEST(OutputFile, FullDisksAreReportedByTheNameOfTheTarget) {
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_EQ(WEXITSTATUS(status), 6);
+}
+
+void make_no_link(const std::filesystem::path&, const std::filesystem::path&, std::error_code& error) {
+  error = std::make_error_code(std::errc::operation_not_supported);
+}
+
+TEST(ReplacedFile, TheContentComesBackWithAndWithoutHardLinks) {
+  const TemporaryFolder folder;
+  ReplacedFile::Link* const make_link = std::filesystem::create_hard_link;
+  for (ReplacedFile::Link* const link : {make_link, &make_no_link}) {
+    write_text(folder / "a", "old");
+    {
+      ReplacedFile kept(folder / "a", *link);
+      OutputFile output(folder / "a", true);
+      output.write(std::as_bytes(std::span(std::string_view("new"))));
+      output.commit();
+      EXPECT_EQ(read_text(folder / "a"), "new");
+      kept.restore();
+      EXPECT_EQ(read_text(folder / "a"), "old");
+    }
+    EXPECT_EQ(read_text(folder / "a"), "old");
+    EXPECT_EQ(folder.files(), 1u);
+  }
+  const ReplacedFile nothing(folder / "b");
+  EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(JsonOutput, WritesFilesThatParse) {
