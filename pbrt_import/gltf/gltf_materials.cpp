@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pbrt_import/files/image_file.h"
+#include "pbrt_import/language/transforms.h"
 #include "pbrt_import/text/problem_text.h"
 
 namespace packtrace::gltf {
@@ -17,19 +18,6 @@ Vec3 to_vec3(const std::vector<double>& v) {
 float clamped(double value) { return static_cast<float>(std::clamp(value, 0.0, 1.0)); }
 
 std::string_view wrap_name(uint64_t mode) { return mode == 33071 ? "clamp" : "repeat"; }
-
-/// Index of refraction with the reflectance of the material's when looked at straight: KHR_materials_specular scales
-/// what KHR_materials_ior gives.
-float index_of(const Value& material) {
-  constexpr double kDefault = 1.5;
-  const std::optional<Value> ior = material.extension("KHR_materials_ior");
-  const double index = std::max(ior ? ior->number_or("ior", kDefault) : kDefault, 1.0);
-  const std::optional<Value> specular = material.extension("KHR_materials_specular");
-  if (!specular) return static_cast<float>(index);
-  const double factor = std::clamp(specular->number_or("specularFactor", 1.0), 0.0, 1.0);
-  const double root = std::sqrt(factor) * (index - 1.0) / (index + 1.0);
-  return static_cast<float>((1.0 + root) / (1.0 - root));
-}
 
 } // namespace
 
@@ -154,6 +142,24 @@ std::string Materials::define_image(const Value& info, MaterialUse& use, std::st
   }
   feed.send();
   return name;
+}
+
+/// Index of refraction with the reflectance of the material's when looked at straight: KHR_materials_specular scales
+/// what KHR_materials_ior gives.
+float Materials::index_of(const Value& material) {
+  constexpr double kDefault = 1.5, kMost = 1000.0;
+  const std::optional<Value> ior = material.extension("KHR_materials_ior");
+  double index = ior ? ior->number_or("ior", kDefault) : kDefault;
+  if (!(index >= 1.0 && index <= kMost)) {
+    warn(material.path() + " has an index of refraction of " + to_text(index) +
+         ", which is not within 1 and 1000; it counts as 1.5");
+    index = kDefault;
+  }
+  const std::optional<Value> specular = material.extension("KHR_materials_specular");
+  if (!specular) return static_cast<float>(index);
+  const double factor = std::clamp(specular->number_or("specularFactor", 1.0), 0.0, 1.0);
+  const double root = std::sqrt(factor) * (index - 1.0) / (index + 1.0);
+  return static_cast<float>((1.0 + root) / (1.0 - root));
 }
 
 void Materials::define(const Value& material, MaterialUse& use) {

@@ -39,6 +39,7 @@ private:
   };
   void define(const Value& material, MaterialUse& use);
   std::string define_image(const Value& info, MaterialUse& use, std::string_view what, std::optional<float> cutoff);
+  float index_of(const Value& material);
   void read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset);
   std::string image_file(uint64_t image);
   Vec3 image_average(const Value& info);

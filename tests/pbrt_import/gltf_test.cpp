@@ -189,6 +189,7 @@ TEST(GltfMaterials, ColoursMasksAndLight) {
 
 TEST(GltfMaterials, IndexAndFactorGiveTheReflectance) {
   const SceneFolder folder;
+  uint64_t problems = 0;
   const auto index_of = [&](const Json& extensions) {
     GltfBuilder gltf;
     gltf.json["materials"] = {{{"extensions", extensions}, {"pbrMetallicRoughness", {{"metallicFactor", 0.0}}}}};
@@ -196,7 +197,9 @@ TEST(GltfMaterials, IndexAndFactorGiveTheReflectance) {
                             {"material", 0}};
     ImportOptions options;
     options.keep_shading = true;
-    return only_material(import_gltf(folder, with_primitive(primitive, gltf), options)).shading.eta;
+    const Imported imported = import_gltf(folder, with_primitive(primitive, gltf), options);
+    problems = imported.reported("not within 1 and 1000; it counts as 1.5");
+    return only_material(imported).shading.eta;
   };
   EXPECT_FLOAT_EQ(index_of(Json::object()), 1.5f);
   EXPECT_FLOAT_EQ(index_of({{"KHR_materials_ior", {{"ior", 2.0}}}}), 2.0f);
@@ -204,6 +207,11 @@ TEST(GltfMaterials, IndexAndFactorGiveTheReflectance) {
   EXPECT_FLOAT_EQ(
       index_of({{"KHR_materials_ior", {{"ior", 2.0}}}, {"KHR_materials_specular", {{"specularFactor", 0.25}}}}), 1.4f);
   EXPECT_FLOAT_EQ(index_of({{"KHR_materials_specular", {{"specularFactor", 0.0}}}}), 1.0f);
+  EXPECT_EQ(problems, 0u);
+  for (const double wrong : {0.0, 0.5, -1.0, 1e30}) {
+    EXPECT_FLOAT_EQ(index_of({{"KHR_materials_ior", {{"ior", wrong}}}}), 1.5f);
+    EXPECT_EQ(problems, 1u) << wrong;
+  }
 }
 
 /// A square whose buffer views are compressed by EXT_meshopt_compression.
