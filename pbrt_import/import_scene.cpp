@@ -27,6 +27,8 @@ void check_options(const ImportOptions& options) {
   require(!options.time || std::isfinite(*options.time), "the time must be finite");
   require(options.tessellation_tolerance >= 1e-6 && options.tessellation_tolerance <= 0.5,
           "tessellation_tolerance must lie within [1e-6, 0.5]");
+  require(!options.frames_per_second || (std::isfinite(*options.frames_per_second) && *options.frames_per_second > 0.0),
+          "frames_per_second must be finite and positive");
   require(options.mesh_scale >= 1e-30 && options.mesh_scale <= 1e30, "mesh_scale must lie within [1e-30, 1e30]");
 }
 
@@ -123,7 +125,6 @@ ImportResult import_mesh_files(std::span<const std::filesystem::path> files, con
   result.files.insert(result.files.end(), named.begin(), named.end());
   result.statistics.files_read += read.files_read;
   result.statistics.bytes_read += read.bytes_read;
-  result.statistics.deforming_s = read.deforming_s;
   return result;
 }
 

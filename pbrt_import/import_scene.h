@@ -12,6 +12,7 @@
 #include "pbrt_import/base/diagnostics.h"
 #include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/mesh_sequence.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
@@ -36,8 +37,10 @@ struct ImportOptions {
   std::optional<uint32_t> world;
   std::optional<double> time; ///< time at which animations are evaluated; unset: shutter opening of the camera
   double mesh_scale = 1.0;    ///< factor of the coordinates of mesh files, within [1e-30, 1e30]
-  /// Time of morph targets and skins of glTF files, whose animation repeats; unset: as `time`, without repetition.
-  std::optional<double> pose_time;
+  /// Keeps the frames of meshes of glTF files that morph targets or skins deform (ImportResult::sequences), at about
+  /// this rate, which is finite and positive. Such meshes then stand as at 0 s, since the animation repeats; unset: as
+  /// at `time`.
+  std::optional<double> frames_per_second;
   std::optional<std::string> animation; ///< of glTF files: name or number of the one that moves nodes; unset: the first
   bool allow_uris_outside_folder = false; ///< glTF files may name files outside their folder
   UpAxis mesh_up = UpAxis::kY;            ///< up axis of mesh files; scenes have y
@@ -61,7 +64,6 @@ struct ImportStatistics {
   uint64_t animated_shapes = 0;              ///< shapes in the scene, counted once per object
   uint64_t animated_instances = 0;
   uint64_t animated_cameras = 0;
-  double deforming_s = 0.0;                ///< duration of the animation that deforms meshes of glTF files; 0: none
   uint64_t cameras_left_out = 0;           ///< cameras left out because of an error in them or in their transform
   std::array<uint64_t, 3> problems{};      ///< problems reported, by Severity
   std::map<std::string, uint64_t> ignored; ///< occurrences of unsupported features; names in docs/json_output.md
@@ -71,7 +73,11 @@ struct ImportResult {
   Scene scene;
   ImportStatistics statistics;
   std::vector<std::filesystem::path> files; ///< all files that the scene names, read or not, in no particular order
-  MemoryReservation memory;                 ///< reservation for the scene; must live as long as the scene
+  /// Frames of the meshes that the animation of a glTF file deforms, if ImportOptions::frames_per_second is set; by
+  /// ascending mesh. A file has as many frames as its animation's span has at that rate, rounded, and at least two.
+  /// Their rate is frames / span, so that they repeat with the tracks of nodes; frame k shows the time k / rate.
+  std::vector<MeshSequence> sequences;
+  MemoryReservation memory; ///< reservation for the scene; must live as long as the scene
 };
 
 /// Reads a pbrt-v3 scene with all files that it includes, or a mesh file (see import_mesh_files()). Problems are

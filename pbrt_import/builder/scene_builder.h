@@ -35,6 +35,9 @@ public:
   /// Adds a track for TrackedMotion; returns its number. Throws MemoryError.
   uint32_t add_track(MotionTrack track);
 
+  /// Adds frames for Directive::sequence; returns their number. The mesh is that of the shape.
+  uint32_t add_sequence(MeshSequence sequence);
+
   /// Reads the files that the scene needs and returns the scene. Call once, after the last directive.
   /// @param end position of the end of the text
   /// Throws Error(kInput) if the text does not have the requested world; MemoryError; Error(kCancelled).
@@ -133,7 +136,8 @@ private:
   uint64_t kept_bytes_ = 0;
   LargeHeapPages heap_pages_;
   TrackedMotions tracked_;
-  MeshQueue mesh_queue_; ///< last member, so that its tasks end before other members are destroyed
+  std::vector<MeshSequence> sequences_; ///< MeshSequence::mesh is kNone until a shape has the frames
+  MeshQueue mesh_queue_;                ///< last member, so that its tasks end before other members are destroyed
 };
 
 } // namespace packtrace

@@ -138,11 +138,19 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   }
   if (!make_or_queue(std::move(entry))) return false;
   shape.mesh = static_cast<uint32_t>(scene_.meshes.size() - 1);
+  if (directive.sequence != kNoSequence) sequences_[directive.sequence].mesh = shape.mesh;
   if (!same_as.empty()) {
     mesh_keys_.intern(same_as);
     mesh_slots_by_key_.push_back(shape.mesh);
   }
   return true;
+}
+
+uint32_t SceneBuilder::add_sequence(MeshSequence sequence) {
+  sequence.mesh = kNone;
+  reserve_one_more(sequences_);
+  sequences_.push_back(std::move(sequence));
+  return static_cast<uint32_t>(sequences_.size() - 1);
 }
 
 /// Adds a mesh to the scene. Large meshes are queued and stay empty until take_queued_meshes().
@@ -280,7 +288,10 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   scene_.motion = tracked_.take(scene_.shapes.size(), cameras_.tracks());
   move_far_world(scene_, instance_residuals_);
   instance_residuals_ = {};
-  drop_unused_parts(scene_);
+  const std::vector<uint32_t> mesh_numbers = drop_unused_parts(scene_);
+  for (MeshSequence& sequence : sequences_)
+    sequence.mesh = sequence.mesh == kNone ? kDropped : mesh_numbers[sequence.mesh];
+  std::erase_if(sequences_, [](const MeshSequence& sequence) { return sequence.mesh == kDropped; });
   if (scene_.cameras.size() > 1)
     reporter_.note(end,
                    std::to_string(scene_.cameras.size()) + " cameras: the last one comes first, as pbrt uses that");
@@ -290,7 +301,8 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   memory.merge(std::move(kept_memory_));
   memory.merge(loader_.take_memory());
   memory.merge(std::move(texture_memory));
-  return {std::move(scene_), std::move(statistics_), file_names_.take_named(), std::move(memory)};
+  return {std::move(scene_), std::move(statistics_), file_names_.take_named(), std::move(sequences_),
+          std::move(memory)};
 }
 
 } // namespace packtrace

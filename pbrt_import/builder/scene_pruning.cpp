@@ -61,7 +61,7 @@ std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& res
   return instance_numbers;
 }
 
-void drop_unused_parts(Scene& scene) {
+std::vector<uint32_t> drop_unused_parts(Scene& scene) {
   std::vector<uint8_t> meshes(scene.meshes.size()), materials(scene.materials.size()), masks(scene.masks.size());
   for_each_shape(scene, [&](const Shape& shape) { meshes[shape.mesh] = materials[shape.material] = 1; });
   const std::vector<uint32_t> mesh_numbers = keep_used(scene.meshes, meshes);
@@ -85,6 +85,7 @@ void drop_unused_parts(Scene& scene) {
   for (Material& material : scene.materials)
     if (material.albedo_texture != kNoTexture) material.albedo_texture = texture_numbers[material.albedo_texture];
   drop_unused_animations(scene);
+  return mesh_numbers;
 }
 
 } // namespace packtrace

@@ -107,6 +107,19 @@ std::vector<PlacedNode> place_nodes(Document& document, const Animation& animati
   return placed;
 }
 
+std::vector<PlacedNode> nodes_at(Document& document, const Animation& animation, std::span<const PlacedNode> nodes,
+                                 double time) {
+  std::vector<PlacedNode> moved(nodes.begin(), nodes.end());
+  for (PlacedNode& placed : moved) {
+    if (placed.mover == kNoNode && !animation.morphs(placed.node)) continue;
+    AnimatedValues values = animation.at(placed.node, time);
+    const DAffine local = local_map(document.element("nodes", placed.node), values);
+    placed.world_from_node = placed.parent == kNoNode ? local : compose(moved[placed.parent].world_from_node, local);
+    if (values.weights) placed.weights = std::move(*values.weights);
+  }
+  return moved;
+}
+
 std::vector<DAffine> instances_of(Document& document, const Value& node) {
   const std::optional<Value> extension = node.extension("EXT_mesh_gpu_instancing");
   if (!extension) return {DAffine(1.0)};

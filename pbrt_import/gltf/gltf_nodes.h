@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <glm/gtc/quaternion.hpp>
@@ -28,6 +29,10 @@ struct PlacedNode {
 /// @param time at which the animation is evaluated, in seconds. Throws MemoryError; Error(kInput) if the document has
 /// no usable scene.
 std::vector<PlacedNode> place_nodes(Document& document, const Animation& animation, double time);
+
+/// The same nodes at another time.
+std::vector<PlacedNode> nodes_at(Document& document, const Animation& animation, std::span<const PlacedNode> nodes,
+                                 double time);
 
 /// Maps of the instances that EXT_mesh_gpu_instancing makes of a node; a single identity without it.
 std::vector<DAffine> instances_of(Document& document, const Value& node);

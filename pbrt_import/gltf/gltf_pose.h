@@ -14,34 +14,48 @@ namespace packtrace::gltf {
 /// Maps of joints from where the mesh is bound to the world.
 using JointMaps = std::shared_ptr<const std::vector<DAffine>>;
 
+/// What deforms a mesh in each frame of its animation.
+struct PoseFrames {
+  uint32_t count = 0;                       ///< at least 2
+  double frames_per_second = 0.0;           ///< for which the frames repeat with the animation
+  std::vector<std::vector<double>> weights; ///< of morph targets by frame; empty: the mesh's own
+  std::vector<JointMaps> joints;            ///< of the skin by frame; null: no skin
+  MemoryReservation memory{};               ///< for the above
+};
+
 /// What deforms a mesh at the scene's time.
 struct Pose {
-  std::span<const double> weights; ///< of morph targets, of the placed node; empty: the mesh's own
-  JointMaps joints;                ///< of the skin; null: no skin
+  std::span<const double> weights;          ///< of morph targets, of the placed node; empty: the mesh's own
+  JointMaps joints;                         ///< of the skin; null: no skin
+  std::shared_ptr<const PoseFrames> frames; ///< null: no frames are kept
   bool skinned() const { return joints && !joints->empty(); }
   bool empty() const { return weights.empty() && !skinned(); }
 };
 
-/// The skins of a document at the scene's time.
+/// The skins of a document.
 class Skins {
 public:
-  /// @param nodes must outlive this
+  /// @param nodes of the scene, at any time
   Skins(Document& document, std::span<const PlacedNode> nodes);
 
-  /// Maps of a skin's joints; nodes with one skin share them. Throws Error(kInput) if the skin is malformed or has a
-  /// joint outside the scene.
-  JointMaps joint_maps(uint64_t skin);
-  /// Whether an animation moves any of a skin's joints; joint_maps() has succeeded for it.
-  bool moves(uint64_t skin);
+  /// Maps of a skin's joints. Throws Error(kInput) if the skin is malformed or has a joint outside the scene;
+  /// MemoryError.
+  /// @param nodes those of the constructor, at the time of the maps
+  std::vector<DAffine> joint_maps(uint64_t skin, std::span<const PlacedNode> nodes);
+  /// Whether an animation moves any of a skin's joints. Throws like joint_maps().
+  bool moves(uint64_t skin, std::span<const PlacedNode> nodes);
 
 private:
-  std::vector<DAffine> read(uint64_t skin) const;
+  struct Skin {
+    std::vector<size_t> joints;           ///< indices of placed nodes
+    std::vector<DAffine> joint_from_mesh; ///< inverse bind matrices by joint; empty: identities
+  };
+  const Skin& skin(uint64_t number);
+  Skin read(uint64_t skin) const;
 
   Document& document_;
-  std::span<const PlacedNode> nodes_;
-  std::vector<size_t> places_; ///< in nodes_ by number of a node; nodes_.size(): outside the scene
-  std::map<uint64_t, JointMaps> known_;
-  std::map<uint64_t, bool> moving_;
+  std::vector<size_t> places_; ///< of placed nodes by number of a node; kNoNode: outside the scene
+  std::map<uint64_t, Skin> known_;
 };
 
 /// The joints that move a vertex: four at a time.
@@ -49,9 +63,31 @@ struct JointSet {
   std::vector<float> joints, weights; ///< four of each per vertex
 };
 
+/// The skins of a document at one time. Users of a skin share its maps.
+class PosedSkins {
+public:
+  /// The arguments must outlive this.
+  PosedSkins(Skins& skins, std::span<const PlacedNode> nodes) : skins_(skins), nodes_(nodes) {}
+  /// Throws like Skins::joint_maps().
+  JointMaps maps(uint64_t skin);
+
+private:
+  Skins& skins_;
+  std::span<const PlacedNode> nodes_;
+  std::map<uint64_t, JointMaps> known_;
+};
+
+/// Throws Error(kInput), at the primitive, if a set has other numbers of joints or weights than four per vertex, or a
+/// vertex hangs on a joint that the skin lacks.
+void check_joints(std::span<const JointSet> sets, uint64_t vertices, size_t joint_count, const Value& primitive);
+
+/// Adds the displacements of a morph target to positions or normals; what lies beyond either is left as it is.
+void add_target(std::span<const float> displacements, double weight, std::span<float> values);
+
 /// Moves positions and normals (empty: none) with the joints. Source: glTF 2.0 specification, section 3.7.3.3.
-/// Vertices without weights stay. Throws Error(kInput), at the primitive, for joints that the skin lacks.
-void move_with_joints(std::span<const DAffine> joint_maps, std::span<const JointSet> sets, const Value& primitive,
+/// Vertices without weights stay.
+/// @param sets checked by check_joints()
+void move_with_joints(std::span<const DAffine> joint_maps, std::span<const JointSet> sets,
                       std::vector<float>& positions, std::vector<float>& normals);
 
 } // namespace packtrace::gltf

@@ -9,6 +9,7 @@
 
 #include "pbrt_import/gltf/gltf_accessors.h"
 #include "pbrt_import/gltf/gltf_draco.h"
+#include "pbrt_import/gltf/gltf_frames.h"
 
 namespace packtrace::gltf {
 namespace {
@@ -78,27 +79,76 @@ PrimitiveMesh read_draco(Document& document, const Value& primitive, const Value
   return mesh;
 }
 
-/// Adds the morph targets of a primitive.
+/// Weights of a primitive's morph targets, one per target or none at all.
 /// @param pose_weights empty: those of its mesh
-void morph(Document& document, const Value& mesh_value, const Value& primitive, std::span<const double> pose_weights,
-           PrimitiveMesh& mesh) {
+std::vector<double> morph_weights(const Value& mesh_value, const Value& primitive,
+                                  std::span<const double> pose_weights) {
   const std::optional<Value> targets = primitive.find("targets"), own = mesh_value.find("weights");
-  if (!targets) return;
+  if (!targets) return {};
   std::vector<double> weights(pose_weights.begin(), pose_weights.end());
   if (weights.empty() && own) weights = own->numbers(own->size());
   if (!weights.empty() && weights.size() != targets->size())
     primitive.fail("has " + std::to_string(targets->size()) + " morph targets, but " + std::to_string(weights.size()) +
                    " weights");
+  return weights;
+}
+
+std::vector<float> read_target(Document& document, const Value& primitive, size_t number, const char* attribute,
+                               const PrimitiveMesh& mesh) {
+  uint64_t vertices = mesh.vertices;
+  return read_attribute(document, primitive.at("targets")[number], attribute, 3, vertices);
+}
+
+void morph(Document& document, const Value& primitive, std::span<const double> weights, PrimitiveMesh& mesh) {
   for (size_t i = 0; i < weights.size(); ++i) {
-    const double weight = weights[i];
-    if (weight == 0.0) continue;
-    uint64_t vertices = mesh.vertices;
-    const std::vector<float> moved = read_attribute(document, (*targets)[i], "POSITION", 3, vertices);
-    for (size_t k = 0; k < moved.size(); ++k) mesh.positions[k] += static_cast<float>(weight * double{moved[k]});
-    const std::vector<float> turned = read_attribute(document, (*targets)[i], "NORMAL", 3, vertices);
-    for (size_t k = 0; k < std::min(turned.size(), mesh.normals.size()); ++k)
-      mesh.normals[k] += static_cast<float>(weight * double{turned[k]});
+    if (weights[i] == 0.0) continue;
+    add_target(read_target(document, primitive, i, "POSITION", mesh), weights[i], mesh.positions);
+    add_target(read_target(document, primitive, i, "NORMAL", mesh), weights[i], mesh.normals);
   }
+}
+
+/// What the frames of a primitive are made from.
+/// @param mesh before it is deformed
+PosedFrames::Source frame_source(Document& document, const Value& mesh_value, const Value& primitive,
+                                 const PoseFrames& poses, const PrimitiveMesh& mesh) {
+  PosedFrames::Source source;
+  source.positions = mesh.positions, source.joints = mesh.joints;
+  source.mesh_weights = morph_weights(mesh_value, primitive, {});
+  const std::optional<Value> targets = primitive.find("targets");
+  source.targets.resize(targets ? targets->size() : 0);
+  for (const std::vector<double>& weights : poses.weights)
+    for (size_t i = 0; i < morph_weights(mesh_value, primitive, weights).size(); ++i)
+      if ((weights.empty() ? source.mesh_weights : weights)[i] != 0.0 && source.targets[i].empty())
+        source.targets[i] = read_target(document, primitive, i, "POSITION", mesh);
+  return source;
+}
+
+/// Which vertices the importer keeps: those of triangles with three corners at finite places.
+std::vector<uint8_t> used_vertices(const PrimitiveMesh& mesh, const std::vector<int32_t>& indices) {
+  std::vector<uint8_t> used(static_cast<size_t>(mesh.vertices), 0);
+  const auto finite = [&](int32_t v) {
+    const float* const p = mesh.positions.data() + 3 * static_cast<size_t>(v);
+    return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+  };
+  for (size_t i = 0; i + 2 < indices.size(); i += 3) {
+    const int32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
+    if (a == b || b == c || c == a || !finite(a) || !finite(b) || !finite(c)) continue;
+    for (const int32_t v : {a, b, c}) used[static_cast<size_t>(v)] = 1;
+  }
+  return used;
+}
+
+/// Frames of a primitive; null if all are the same.
+std::shared_ptr<const MeshFrames> frames_of(Document& document, const Value& primitive, const Pose& pose,
+                                            PosedFrames::Source source) {
+  auto frames = std::make_shared<const PosedFrames>(primitive.path(), pose.frames, std::move(source),
+                                                    document.context().options.memory);
+  const std::vector<Vec3> first = frames->positions(0);
+  for (uint32_t frame = 1; frame < frames->count(); ++frame) {
+    document.context().progress.check_cancelled();
+    if (frames->positions(frame) != first) return frames;
+  }
+  return nullptr;
 }
 
 std::vector<int32_t> triangles_of(const PrimitiveMesh& mesh, Mode mode, const Value& primitive) {
@@ -185,17 +235,20 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
   PrimitiveMesh mesh = draco ? read_draco(document, primitive, *draco, uv_name, pose.skinned())
                              : read_plain(document, primitive, uv_name, pose.skinned());
   if (mesh.positions.empty()) primitive.fail("has no positions");
-  morph(document, mesh_value, primitive, pose.weights, mesh);
-  if (pose.skinned()) {
-    for (const JointSet& set : mesh.joints)
-      if (set.joints.size() != mesh.vertices * 4 || set.weights.size() != mesh.vertices * 4)
-        primitive.fail("has joints without weights");
-    move_with_joints(*pose.joints, mesh.joints, primitive, mesh.positions, mesh.normals);
-  }
+  if (pose.skinned()) check_joints(mesh.joints, mesh.vertices, pose.joints->size(), primitive);
+  PosedFrames::Source source;
+  if (pose.frames) source = frame_source(document, mesh_value, primitive, *pose.frames, mesh);
+  morph(document, primitive, morph_weights(mesh_value, primitive, pose.weights), mesh);
+  if (pose.skinned()) move_with_joints(*pose.joints, mesh.joints, mesh.positions, mesh.normals);
   // Draco's decoder turns strips into triangles.
   const std::vector<int32_t> indices = triangles_of(mesh, draco ? Mode::kTriangles : Mode{mode}, primitive);
   if (indices.empty()) return;
   convert_uvs(mesh.uvs, use);
+  std::shared_ptr<const MeshFrames> frames;
+  if (pose.frames) {
+    source.used = used_vertices(mesh, indices);
+    frames = frames_of(document, primitive, pose, std::move(source));
+  }
 
   const Place place = document.place();
   feed.with_attributes(place, [&] {
@@ -216,6 +269,7 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
     feed.integers("indices", indices);
     if (const std::optional<std::vector<int32_t>> lattice = lattice_of(document, mesh_value, primitive, pose.skinned()))
       feed.integers("lattice", *lattice);
+    if (frames) feed.deforms({0, frames, pose.frames->frames_per_second, 0});
     if (use.absent)
       feed.number("alpha", 0.0f);
     else if (!use.opacity.empty())

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <numbers>
 
 #include "pbrt_import/gltf/gltf_primitive.h"
@@ -22,15 +24,11 @@ Reader::Reader(const std::filesystem::path& file, uint32_t file_number, const Me
                const DAffine& world_from_file)
     : context_(context), world_from_file_(world_from_file),
       document_(std::make_unique<Document>(file, file_number, context)), animation_(*document_),
-      pose_time_(context.options.pose_time ? animation_.repeated(*context.options.pose_time)
-                                           : context.options.time.value_or(0.0)),
+      pose_time_(context.options.frames_per_second ? animation_.repeated(0.0) : context.options.time.value_or(0.0)),
       nodes_(place_nodes(*document_, animation_, context.options.time.value_or(0.0))),
       tracks_(*document_, animation_, nodes_, world_from_file_), is_object_(document_->count("meshes"), 0) {
-  if (context.options.pose_time) posed_ = place_nodes(*document_, animation_, pose_time_);
+  if (context.options.frames_per_second) posed_ = nodes_at(*document_, animation_, nodes_, pose_time_);
   collect_meshes();
-  if (deforms_)
-    context_.statistics.deforming_s =
-        std::max(context_.statistics.deforming_s, animation_.span().end_s - animation_.span().begin_s);
 }
 
 void Reader::report(const std::string& problem, std::string_view consequence) {
@@ -41,39 +39,78 @@ void Reader::collect_meshes() {
   MemoryReservation& memory = document_->memory();
   memory.resize(memory.bytes() + nodes_.size() * sizeof(MeshUse), "nodes of the glTF document");
   uses_.reserve(nodes_.size());
-  Skins skins(*document_, posed());
+  Skins skins(*document_, nodes_);
+  PosedSkins posed_skins(skins, posed());
   for (size_t i = 0; i < nodes_.size(); ++i) {
     context_.progress.check_cancelled();
-    report(problem_of([&] { collect_mesh(i, skins); }), "the node is left out");
+    report(problem_of([&] { collect_mesh(i, skins, posed_skins); }), "the node is left out");
   }
+  if (context_.options.frames_per_second) collect_frames(skins);
   std::vector<uint64_t> counts(is_object_.size(), 0);
   for (const MeshUse& use : uses_)
     if (use.pose.empty()) counts[static_cast<size_t>(use.mesh)] += use.motion ? 2 : use.node_from_mesh.size();
   for (size_t i = 0; i < counts.size(); ++i) is_object_[i] = counts[i] > 1;
 }
 
-void Reader::collect_mesh(size_t placed, Skins& skins) {
+void Reader::collect_mesh(size_t placed, Skins& skins, PosedSkins& posed_skins) {
   const Value node = document_->element("nodes", nodes_[placed].node);
   const std::optional<uint64_t> mesh = node.find_integer("mesh");
   if (!mesh) return;
   document_->element("meshes", *mesh); // throws if there is none
   MeshUse use;
   use.mesh = *mesh;
+  use.weights_of = placed;
   use.pose.weights = posed()[placed].weights;
-  deforms_ |= animation_.morphs(nodes_[placed].node);
-  if (const std::optional<uint64_t> skin = node.find_integer("skin")) {
-    use.pose.joints = skins.joint_maps(*skin);
-    deforms_ |= skins.moves(*skin);
+  use.deforms = animation_.morphs(nodes_[placed].node);
+  use.skin = node.find_integer("skin");
+  if (use.skin) {
+    use.pose.joints = posed_skins.maps(*use.skin);
+    use.deforms |= skins.moves(*use.skin, nodes_);
   } else {
     use.placed = placed;
     use.node_from_mesh = instances_of(*document_, node);
-    report(problem_of([&] { use.motion = tracks_.of(placed); }), "the node stands still");
+    report(problem_of([&] { use.motion = tracks_.of(placed); }), "the node and all that hangs on it stand still");
   }
   uses_.push_back(std::move(use));
 }
 
+/// Evaluates what deforms the meshes in all frames.
+void Reader::collect_frames(Skins& skins) {
+  const double span_s = animation_.span().end_s - animation_.span().begin_s;
+  std::map<size_t, std::shared_ptr<PoseFrames>> moving; // by index of the use
+  for (size_t i = 0; i < uses_.size(); ++i)
+    if (uses_[i].deforms) moving[i] = std::make_shared<PoseFrames>();
+  if (moving.empty() || !(span_s > 0.0)) return;
+  const double wanted = std::max(2.0, std::floor(span_s * *context_.options.frames_per_second + 0.5));
+  if (!(wanted <= double{std::numeric_limits<int32_t>::max()}))
+    throw Error(ErrorKind::kLimitExceeded, "the animation has too many frames");
+  const auto count = static_cast<uint32_t>(wanted);
+  const double rate = wanted / span_s;
+  for (const auto& [i, frames] : moving) {
+    const uint64_t each = sizeof(std::vector<double>) + sizeof(JointMaps) +
+                          uses_[i].pose.weights.size() * sizeof(double) +
+                          (uses_[i].skin ? 64 + uses_[i].pose.joints->size() * sizeof(DAffine) : 0);
+    frames->memory = MemoryReservation(context_.options.memory);
+    frames->memory.resize(count * each, "poses of the glTF document");
+    frames->count = count, frames->frames_per_second = rate;
+    frames->weights.resize(count), frames->joints.resize(count);
+  }
+  for (uint32_t frame = 0; frame < count; ++frame) {
+    context_.progress.check_cancelled();
+    const std::vector<PlacedNode> nodes =
+        nodes_at(*document_, animation_, nodes_, animation_.repeated(static_cast<double>(frame) / rate));
+    PosedSkins posed_skins(skins, nodes);
+    for (const auto& [i, frames] : moving) {
+      frames->weights[frame] = nodes[uses_[i].weights_of].weights;
+      if (uses_[i].skin) frames->joints[frame] = posed_skins.maps(*uses_[i].skin);
+    }
+  }
+  for (const auto& [i, frames] : moving) uses_[i].pose.frames = frames;
+}
+
 void Reader::report_motion() {
-  if (deforms_ && !context_.options.pose_time)
+  const bool deforms = std::ranges::any_of(uses_, [](const MeshUse& use) { return use.deforms; });
+  if (deforms && !context_.options.frames_per_second)
     context_.feed.reporter().note(document_->place(), "morph targets and skins stand as at " + to_text(pose_time_) +
                                                           " s; bake --sequence animation keeps their motion");
   const TimeSpan span = animation_.span();

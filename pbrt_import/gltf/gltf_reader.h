@@ -37,14 +37,18 @@ private:
     uint64_t mesh = 0;
     size_t placed = kNoNode;                              ///< the node; none for skins, which joints move
     std::vector<DAffine> node_from_mesh = {DAffine(1.0)}; ///< of its instances
+    size_t weights_of = kNoNode;                          ///< placed node with the weights of morph targets
+    std::optional<uint64_t> skin;
     Pose pose;
+    bool deforms = false; ///< the animation moves its morph targets or its joints
     std::optional<NodeMotion> motion;
     /// Whether the mesh is in an object of its own: it is deformed, and moves as a whole.
     bool alone() const { return !pose.empty() && motion.has_value(); }
   };
   void add_camera(size_t placed, uint64_t camera);
   void collect_meshes();
-  void collect_mesh(size_t placed, Skins& skins);
+  void collect_frames(Skins& skins);
+  void collect_mesh(size_t placed, Skins& skins, PosedSkins& posed_skins);
   void add_objects(const Materials& materials);
   void add_object(const Materials& materials, uint64_t mesh, const Pose& pose, const std::string& name);
   void add_use(const Materials& materials, const MeshUse& use);
@@ -58,12 +62,11 @@ private:
   DAffine world_from_file_;
   std::unique_ptr<Document> document_;
   Animation animation_;
-  double pose_time_;
+  double pose_time_; ///< of morph targets and skins
   std::vector<PlacedNode> nodes_;
   std::vector<PlacedNode> posed_; ///< at the time of morphs and skins; empty: as nodes_
   NodeTracks tracks_;
   std::vector<MeshUse> uses_;
-  bool deforms_ = false;           ///< the animation moves morph targets or joints of a mesh
   std::vector<uint8_t> is_object_; ///< by mesh: it moves or has several users that are not deformed
 };
 

@@ -22,6 +22,8 @@ struct TrackedMotion {
   DAffine inner{1.0};        ///< of instances; the identity for cameras
 };
 
+inline constexpr uint32_t kNoSequence = ~0u;
+
 /// One directive with its arguments. It has as many numbers and names as its kind requires; MediumInterface has one or
 /// two names, and names[0] of ActiveTransform is its word.
 struct Directive {
@@ -32,9 +34,10 @@ struct Directive {
   std::array<std::string, 3> names; ///< quoted names, with escapes replaced
   uint32_t name_count = 0;
   ParameterList parameters;
-  MemoryReservation memory; ///< reservation for large parameters
-  TrackedMotion motion;     ///< of ObjectInstance and Camera; never of text
-  bool damaged = false;     ///< its numbers or names are malformed, which was reported; only kind is valid
+  MemoryReservation memory;        ///< reservation for large parameters
+  TrackedMotion motion;            ///< of ObjectInstance and Camera; never of text
+  uint32_t sequence = kNoSequence; ///< of Shape: number that SceneBuilder gave its frames; never of text
+  bool damaged = false;            ///< its numbers or names are malformed, which was reported; only kind is valid
 };
 
 /// Reads directives one by one and follows Include. Malformed input is reported and costs as little as possible: one

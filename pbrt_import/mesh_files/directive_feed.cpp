@@ -30,6 +30,7 @@ void DirectiveFeed::begin(std::string_view keyword, const Place& place, std::ini
   directive_.memory = MemoryReservation(memory_);
   directive_.name_count = 0;
   directive_.motion = {};
+  directive_.sequence = kNoSequence;
   for (const std::string_view name : names) directive_.names[directive_.name_count++] = name;
   std::ranges::copy(numbers, directive_.numbers.begin());
 }

@@ -12,8 +12,8 @@
 
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_error.h"
 #include "pbrt_import/base/with_file.h"
-#include "pbrt_import/gltf_sequence.h"
 #include "pbrt_import/ply_sequence.h"
 #include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/bake_options.h"
@@ -73,20 +73,20 @@ void add_motion_of(const BakeOptions& options, const GlobalOptions& globals, Sce
   add_motion(scene.motion, read_motion_keys(options.keys, motion_targets(scene), globals.memory));
 }
 
+constexpr double kSequenceFps = 24.0;
+
 /// Finds the frames of the meshes that --sequence names.
-void add_sequences(const BakeOptions& options, const GlobalOptions& globals, const ImportResult& imported,
-                   BakeConfig& config, Progress& progress) {
-  const double fps = options.sequence_fps.value_or(24.0);
+void add_sequences(const BakeOptions& options, const ImportResult& imported, BakeConfig& config) {
+  const double fps = options.sequence_fps.value_or(kSequenceFps);
   for (const std::string& pattern : options.sequences) {
     if (pattern != kAnimationSequence) {
       config.sequences.push_back(
           find_mesh_sequence(imported.scene, imported.files, options.input, pattern, options.sequence_start, fps));
       continue;
     }
-    const std::vector<std::filesystem::path> files(options.inputs.begin(), options.inputs.end());
-    const std::vector<MeshSequence> found =
-        find_gltf_sequences(imported, files, import_options(options.scene, globals, config.textures), fps, progress);
-    config.sequences.insert(config.sequences.end(), found.begin(), found.end());
+    if (imported.sequences.empty())
+      throw FileError(ErrorKind::kInput, options.input, "no animation deforms its meshes by morph targets or skins");
+    config.sequences.insert(config.sequences.end(), imported.sequences.begin(), imported.sequences.end());
   }
 }
 
@@ -113,16 +113,14 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
   options.scene.keep_unused_objects = !options.distance_levels.empty(); // levels need no instance
   options.scene.keep_shading = config.purpose == baked::kShading;
   if (std::ranges::find(options.sequences, kAnimationSequence) != options.sequences.end())
-    options.scene.pose_time = 0.0;
+    options.scene.frames_per_second = options.sequence_fps.value_or(kSequenceFps);
   const Stopwatch importing;
   ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   BakeTimings timings;
   timings.import_s = importing.seconds();
   refuse_to_replace(imported.files, options.output);
   add_motion_of(options, globals, imported.scene);
-
-  add_sequences(options, globals, imported, config, progress);
-
+  add_sequences(options, imported, config);
   if (!options.distance_levels.empty()) {
     refuse_to_replace({options.distance_levels}, options.output);
     config.level_chains = read_level_chains(options.distance_levels, imported.scene, globals.memory);

@@ -152,7 +152,7 @@ ImportOptions import_options(const SceneOptions& scene_options, const GlobalOpti
   options.keep_shading = scene_options.keep_shading;
   options.memory = globals.memory;
   options.animation = scene_options.animation;
-  options.pose_time = scene_options.pose_time;
+  options.frames_per_second = scene_options.frames_per_second;
   return options;
 }
 

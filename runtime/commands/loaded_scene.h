@@ -29,14 +29,14 @@ struct SceneOptions {
   bool strict = false;
   std::optional<uint32_t> world;
   std::optional<double> time;
-  std::optional<std::string> up;         ///< axis of mesh files: "x", "y" or "z"
-  std::optional<double> scale;           ///< of mesh files
-  bool allow_outside = false;            ///< glTF files may name files outside their folder
-  std::optional<std::string> animation;  ///< name or number of a glTF file's animation
-  std::optional<double> pose_time;       ///< as in ImportOptions; no option of its own
-  std::vector<std::string> joined_files; ///< further mesh files of the scene; no option of its own
-  bool keep_unused_objects = false;      ///< as in ImportOptions; no option of its own
-  bool keep_shading = false;             ///< as in ImportOptions; no option of its own
+  std::optional<std::string> up;           ///< axis of mesh files: "x", "y" or "z"
+  std::optional<double> scale;             ///< of mesh files
+  bool allow_outside = false;              ///< glTF files may name files outside their folder
+  std::optional<std::string> animation;    ///< name or number of a glTF file's animation
+  std::optional<double> frames_per_second; ///< as in ImportOptions; no option of its own
+  std::vector<std::string> joined_files;   ///< further mesh files of the scene; no option of its own
+  bool keep_unused_objects = false;        ///< as in ImportOptions; no option of its own
+  bool keep_shading = false;               ///< as in ImportOptions; no option of its own
 };
 
 /// Adds --strict, --world, --time, --animation, --up, --scale and --allow-outside to a verb. `options` must outlive the

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "pbrt_import/base/error.h"
-#include "pbrt_import/gltf_sequence.h"
 #include "pbrt_import/scene/motion_pose.h"
 #include "tests/pbrt_import/gltf_documents.h"
 
@@ -182,7 +181,8 @@ TEST(GltfMotion, WhatHasNoTrackStandsStill) {
   add_animation(flat,
                 {{0, "scale", "LINEAR", {0, 1}, {1, 1, 1, 0, 1, 1}}, {0, "rotation", "LINEAR", {0, 1, 4}, kTurns}});
   const Imported imported = import_time(folder, flat, 0.0);
-  EXPECT_TRUE(imported.reported("is flattened at 1 s; the node stands still")) << imported.text();
+  EXPECT_TRUE(imported.reported("is flattened at 1 s; the node and all that hangs on it stand still"))
+      << imported.text();
   EXPECT_EQ(unique_triangle_count(imported.scene), 1u);
   EXPECT_TRUE(imported.scene.motion.empty());
 
@@ -194,7 +194,8 @@ TEST(GltfMotion, WhatHasNoTrackStandsStill) {
   }
   deep.json["scenes"][0]["nodes"] = {69};
   add_animation(deep, channels);
-  EXPECT_TRUE(import_time(folder, deep, 0.0).reported("under more than 64 moving nodes; the node stands still"));
+  EXPECT_TRUE(import_time(folder, deep, 0.0)
+                  .reported("under more than 64 moving nodes; the node and all that hangs on it stand still"));
 
   GltfBuilder same = gltf_triangle();
   add_animation(same, {{0, "translation", "LINEAR", {0, 1}, {0, 5, 0, 0, 5, 0}}});
@@ -222,7 +223,8 @@ TEST(GltfMotion, KeysBeyondLimitsStandStill) {
   GltfBuilder far = gltf_triangle();
   add_animation(far, {{0, "scale", "LINEAR", {0, 1}, {1, 1, 1, 3e38f, 1, 1}}});
   const Imported imported = import_time(folder, far, 0.0);
-  EXPECT_TRUE(imported.reported("leaves the range of positions and scales at 1 s; the node stands still"))
+  EXPECT_TRUE(imported.reported(
+      "leaves the range of positions and scales at 1 s; the node and all that hangs on it stand still"))
       << imported.text();
   EXPECT_TRUE(imported.scene.motion.empty());
 
@@ -252,13 +254,12 @@ TEST(GltfMotion, KeysAreCountedAsMemory) {
   EXPECT_EQ(import_time(folder, gltf, 0.0, options).scene.motion.tracks.at(0).keys.size(), times.size());
 }
 
-std::vector<MeshSequence> sequences_of(const std::filesystem::path& file, ImportResult& imported, double fps) {
+ImportResult import_frames(const std::filesystem::path& file, double fps) {
   ImportOptions options;
-  options.pose_time = 0.0;
+  options.frames_per_second = fps;
   Diagnostics diagnostics;
   Progress progress;
-  imported = import_scene(file, options, diagnostics, progress);
-  return find_gltf_sequences(imported, {&file, 1}, options, fps, progress);
+  return import_scene(file, options, diagnostics, progress);
 }
 
 TEST(GltfSequences, FramesAreThePosesAtTheirTimes) {
@@ -276,8 +277,8 @@ TEST(GltfSequences, FramesAreThePosesAtTheirTimes) {
                        {morphing, "weights", "LINEAR", {0, 1}, {0, 3}},
                        {morphing, "translation", "LINEAR", {0, 2}, {0, 0, 0, 1, 0, 0}}}); // moves and deforms
   const std::filesystem::path file = folder.write("a.gltf", gltf.text());
-  ImportResult imported;
-  const std::vector<MeshSequence> sequences = sequences_of(file, imported, 4.0);
+  const ImportResult imported = import_frames(file, 4.0);
+  const std::vector<MeshSequence>& sequences = imported.sequences;
   ASSERT_EQ(imported.scene.meshes.size(), 3u);
   ASSERT_EQ(sequences.size(), 2u);
   EXPECT_EQ(imported.scene.motion.instances.size(), 1u);
@@ -292,17 +293,62 @@ TEST(GltfSequences, FramesAreThePosesAtTheirTimes) {
   }
 }
 
+TEST(GltfSequences, FramesRepeatWithTheNodes) {
+  const SceneFolder folder;
+  GltfBuilder gltf = gltf_skin();
+  gltf.json["animations"].clear();
+  add_animation(gltf, {{2, "translation", "LINEAR", {0, 1, 2.1f}, {0, 0, 5, 0, 8, 5, 0, 0, 5}}});
+  const ImportResult imported = import_frames(folder.write("a.gltf", gltf.text()), 4.0);
+  const MeshSequence& sequence = imported.sequences.at(0);
+  EXPECT_EQ(sequence.frames->count(), 8u);
+  EXPECT_EQ(static_cast<double>(sequence.frames->count()) / sequence.frames_per_second, double{2.1f});
+  const Imported there = import_time(folder, gltf, 5 / sequence.frames_per_second);
+  EXPECT_EQ(sequence.frames->positions(5), there.scene.meshes[0].positions);
+}
+
+TEST(GltfSequences, VerticesWithoutTrianglesHaveNoFrames) {
+  const SceneFolder folder;
+  GltfBuilder gltf;
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  Json primitive = {{"attributes", {{"POSITION", gltf.positions({9, 9, 9, 0, 0, 0, 1, 0, 0, 0, 1, 0, kNone, 0, 0})}}},
+                    {"indices", gltf.accessor<uint8_t>("SCALAR", 5121, {1, 2, 3, 1, 3, 4})}};
+  primitive["targets"] = {{{"POSITION", gltf.positions({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1})}}};
+  gltf.mesh(primitive);
+  gltf.node({{"mesh", 0}, {"weights", {0}}});
+  add_animation(gltf, {{0, "weights", "LINEAR", {0, 1}, {0, 4}}});
+  const ImportResult imported = import_frames(folder.write("a.gltf", gltf.text()), 4.0);
+  ASSERT_EQ(imported.sequences.size(), 1u);
+  const MeshFrames& frames = *imported.sequences[0].frames;
+  EXPECT_EQ(frames.positions(0), imported.scene.meshes.at(0).positions);
+  EXPECT_EQ(frames.positions(2), (std::vector<Vec3>{{0, 0, 2}, {1, 0, 2}, {0, 1, 2}}));
+  EXPECT_EQ(frames.name(2), "meshes[0].primitives[0] at 0.5 s");
+}
+
 TEST(GltfSequences, WithoutDeformationThereAreNone) {
   const SceneFolder folder;
-  GltfBuilder gltf = gltf_triangle();
-  add_animation(gltf, {{0, "translation", "LINEAR", {0, 1}, {0, 0, 0, 0, 5, 0}}});
-  ImportResult imported;
-  try {
-    sequences_of(folder.write("a.gltf", gltf.text()), imported, 24.0);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("no animation deforms its meshes"), std::string::npos) << error.what();
-  }
+  GltfBuilder moving = gltf_triangle();
+  add_animation(moving, {{0, "translation", "LINEAR", {0, 1}, {0, 0, 0, 0, 5, 0}}});
+  EXPECT_TRUE(import_frames(folder.write("a.gltf", moving.text()), 24.0).sequences.empty());
+  GltfBuilder same = gltf_skin();
+  same.json["animations"].clear();
+  add_animation(same, {{2, "translation", "LINEAR", {0, 2}, {0, 3, 5, 0, 3, 5}}});
+  EXPECT_TRUE(import_frames(folder.write("a.gltf", same.text()), 24.0).sequences.empty());
+}
+
+TEST(GltfSequences, PosesAreCountedAsMemoryBeforeTheyAreMade) {
+  const SceneFolder folder;
+  GltfBuilder gltf = gltf_skin();
+  gltf.json["animations"].clear();
+  add_animation(gltf, {{2, "translation", "LINEAR", {0, 1e6f}, {0, 0, 5, 0, 8, 5}}});
+  const std::filesystem::path file = folder.write("a.gltf", gltf.text());
+  ImportOptions options;
+  options.memory = MemoryBudget(64u << 20);
+  options.frames_per_second = 24.0;
+  Diagnostics diagnostics;
+  Progress progress;
+  EXPECT_THROW(import_scene(file, options, diagnostics, progress), MemoryError);
+  options.frames_per_second = 1e6;
+  EXPECT_THROW(import_scene(file, options, diagnostics, progress), Error);
 }
 
 } // namespace
