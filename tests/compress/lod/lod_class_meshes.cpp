@@ -248,9 +248,12 @@ Mesh strands_mesh(uint32_t count, uint32_t steps, uint32_t sides, double radius,
   Random random(seed);
   Mesh mesh;
   for (uint32_t i = 0; i < count; ++i) {
-    const DVec3 root(random.uniform(0, 1), random.uniform(0, 1), 0.0);
-    const DVec3 tip =
-        root + DVec3(random.uniform(-0.4f, 0.4f), random.uniform(-0.4f, 0.4f), random.uniform(0.6f, 1.2f));
+    // One number a declarator: compilers evaluate arguments in different orders.
+    const double root_y = random.uniform(0, 1), root_x = random.uniform(0, 1);
+    const DVec3 root(root_x, root_y, 0.0);
+    const double height = random.uniform(0.6f, 1.2f);
+    const double lean_y = random.uniform(-0.4f, 0.4f), lean_x = random.uniform(-0.4f, 0.4f);
+    const DVec3 tip = root + DVec3(lean_x, lean_y, height);
     const double curl = random.uniform(0.02f, 0.08f), turns = random.uniform(1.0f, 3.0f);
     add_tube(
         mesh,
@@ -266,7 +269,8 @@ Mesh strands_mesh(uint32_t count, uint32_t steps, uint32_t sides, double radius,
 Mesh fins_mesh(uint32_t count, uint32_t steps, uint32_t seed) {
   Random random(seed);
   const auto vector = [&](float size) {
-    return DVec3(random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size));
+    const double z = random.uniform(-size, size), y = random.uniform(-size, size), x = random.uniform(-size, size);
+    return DVec3(x, y, z);
   };
   Mesh mesh;
   for (uint32_t i = 0; i < count; ++i) {
