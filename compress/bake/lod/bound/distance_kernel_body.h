@@ -1,6 +1,10 @@
 // The bodies of triangle_distances() and nearest_triangle(), compiled per instruction set with the same operations in
 // the same order, so results are bit-identical. No other header's functions may be compiled for AVX2.
 
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
 #include "compress/bake/lod/bound/distance_kernel.h"
 
 namespace packtrace {
@@ -37,6 +41,18 @@ struct Vector4 {
   return out;
 }
 
+[[gnu::always_inline]] inline void root(const Lanes& x, Lanes& out) {
+#if defined(__AVX__)
+  out = _mm256_sqrt_pd(x);
+#elif defined(__SSE2__)
+  const __m128d low = _mm_sqrt_pd(__builtin_shufflevector(x, x, 0, 1));
+  const __m128d high = _mm_sqrt_pd(__builtin_shufflevector(x, x, 2, 3));
+  out = __builtin_shufflevector(low, high, 0, 1, 2, 3);
+#else
+  for (uint64_t lane = 0; lane < 4; ++lane) out[lane] = __builtin_sqrt(x[lane]);
+#endif
+}
+
 [[gnu::always_inline]] inline void distances_to_block(const double* points, uint64_t point_count,
                                                       const TriangleBlock& block, double* const* out, uint64_t at) {
   const Lanes zero = {}, one = zero + 1.0;
@@ -66,7 +82,9 @@ struct Vector4 {
     Lanes plane2;
     dot(d, d, plane2);
     distance2 = inside ? plane2 : distance2;
-    for (uint64_t lane = 0; lane < 4; ++lane) out[i][at + lane] = __builtin_sqrt(distance2[lane]);
+    Lanes distance;
+    root(distance2, distance);
+    __builtin_memcpy(out[i] + at, &distance, sizeof distance);
   }
 }
 

@@ -56,11 +56,13 @@ void SurfaceSide::add_large_fan(std::span<const uint32_t> fan, const Triangle& c
 
 void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double distance) {
   candidates_.clear();
-  if (boxes_.empty())
+  if (boxes_.empty()) {
+    boxes_.reserve(surface_.triangles.size());
     for (uint32_t t = 0; t < surface_.triangles.size(); ++t) {
       const DVec3 &a = surface_.corner(t, 0), &b = surface_.corner(t, 1), &c = surface_.corner(t, 2);
       boxes_.push_back({glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)});
     }
+  }
   const DVec3 lo = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]) - distance;
   const DVec3 hi = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]) + distance;
   for (uint32_t t = 0; t < boxes_.size(); ++t)

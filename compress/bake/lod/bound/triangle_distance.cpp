@@ -4,14 +4,14 @@
 
 namespace packtrace {
 
-DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b) {
+DVec3 nearest_point(const DVec3& p, const DVec3& a, const DVec3& b) {
   const DVec3 d = b - a;
   const double length2 = glm::dot(d, d);
   const double t = length2 > 0.0 ? std::clamp(glm::dot(p - a, d) / length2, 0.0, 1.0) : 0.0;
   return a + t * d;
 }
 
-DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
+DVec3 nearest_point(const DVec3& p, const DVec3& a, const DVec3& b, const DVec3& c) {
   // Projects p to the plane as a + v (b - a) + w (c - a), scaled by area2. If the projection is inside the triangle, it
   // is the nearest point; otherwise the nearest point is on a side that p lies beyond.
   const DVec3 ab = b - a, ac = c - a, ap = p - a;
@@ -27,8 +27,8 @@ DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
     if (w >= 0.0 && v + w <= area2) return nearest_point(p, a, c);
   }
   const DVec3 q[3] = {nearest_point(p, a, b), nearest_point(p, b, c), nearest_point(p, c, a)};
-  const auto distance2 = [&](DVec3 r) { return glm::dot(r - p, r - p); };
-  return *std::min_element(q, q + 3, [&](DVec3 r, DVec3 s) { return distance2(r) < distance2(s); });
+  const auto distance2 = [&](const DVec3& r) { return glm::dot(r - p, r - p); };
+  return *std::min_element(q, q + 3, [&](const DVec3& r, const DVec3& s) { return distance2(r) < distance2(s); });
 }
 
 } // namespace packtrace

@@ -62,6 +62,7 @@ private:
   static constexpr double kLeak = 8.0;
   static constexpr size_t kMaxSubtracted = 48; // triangles
   static constexpr double kGoodEnough = 1.1;   // stops within this factor of the lower bound
+  static constexpr double kRounding = 1e-6;    // steps; error of differences of distances
 
   /// One subdivision level: the corners of a part and the midpoints of its sides, with their distances.
   struct Level {
@@ -113,27 +114,30 @@ private:
     const Level& level = levels_[depth];
     const TriangleSet& among = *level.among;
     if (among.size() > kMaxSubtracted) return false;
-    subtraction_.begin({level.points[corners[0]], level.points[corners[1]], level.points[corners[2]]});
+    const std::array<DVec3, 3> part = {level.points[corners[0]], level.points[corners[1]], level.points[corners[2]]};
+    const auto accept = [&](double distance, uint32_t number) { return distance <= good || enough(distance, number); };
+    subtraction_.begin(part);
     taken_.clear();
+    find_near(level, corners, part, accept);
     work_ += among.size();
-    for (uint32_t i = 0; i < among.size() && !subtraction_.rest().empty(); ++i) {
-      const uint32_t number = among.number(i);
+    for (size_t k = 0; k < near_.size() && !subtraction_.rest().empty(); ++k) {
+      const uint32_t number = among.number(near_[k]);
       subtraction_.subtract(
-          among.corners(i), [&](double distance) { return distance <= good || enough(distance, number); },
+          among.corners(near_[k]), [&](double distance) { return accept(distance, number); },
           [&](double distance) { taken_.emplace_back(number, distance); });
       if (subtraction_.rest().size() > TriangleSubtraction::kMaxRest) return false;
     }
     if (taken_.empty()) return false;
     for (const TriangleSubtraction::Polygon& rest : subtraction_.rest()) {
-      uint32_t i = 0;
-      double distance = 0.0;
       work_ += among.size();
-      for (; i < among.size(); ++i) {
-        distance = TriangleSubtraction::distance(rest, among.corners(i));
-        if (distance <= good || enough(distance, among.number(i))) break;
+      const size_t before = taken_.size();
+      for (size_t k = 0; k < near_.size() && taken_.size() == before; ++k) {
+        const uint32_t number = among.number(near_[k]);
+        const double distance = TriangleSubtraction::distance(
+            rest, among.corners(near_[k]), [&](double of_corner) { return accept(of_corner, number); });
+        if (accept(distance, number)) taken_.emplace_back(number, distance);
       }
-      if (i == among.size()) return false;
-      taken_.emplace_back(among.number(i), distance);
+      if (taken_.size() == before) return false;
     }
     for (const auto& [number, distance] : taken_) {
       largest_ = std::max(largest_, distance);
@@ -142,18 +146,37 @@ private:
     return true;
   }
 
+  /// Distances from each corner to the farthest point of a part.
+  static std::array<double, 3> reaches(const std::array<DVec3, 3>& part) {
+    std::array<double, 3> reach{};
+    for (size_t k = 0; k < 3; ++k)
+      reach[k] = std::max(glm::length(part[(k + 1) % 3] - part[k]), glm::length(part[(k + 2) % 3] - part[k]));
+    return reach;
+  }
+
+  /// Sets near_ to the triangles of the level that may have points of the part at an accepted distance.
+  template <typename Accept>
+  void find_near(const Level& level, const std::array<size_t, 3>& corners, const std::array<DVec3, 3>& part,
+                 const Accept& accept) {
+    const std::array<double, 3> reach = reaches(part);
+    near_.clear();
+    for (uint32_t i = 0; i < level.among->size(); ++i) {
+      const double least =
+          std::max({level.distances[corners[0]][i] - reach[0], level.distances[corners[1]][i] - reach[1],
+                    level.distances[corners[2]][i] - reach[2]});
+      if (accept(least - kRounding, level.among->number(i))) near_.push_back(i);
+    }
+  }
+
   /// Sets up the next level. Triangles that are too far away cannot be nearest for any part; they are dropped from the
   /// set if at least half of it goes.
   template <typename Enough>
   void divide(size_t depth, const std::array<size_t, 3>& corners, size_t where, double good, const Enough& enough) {
     const Level& from = levels_[depth];
     Level& to = levels_[depth + 1];
-    std::array<double, 3> reach{}; // from each corner to the farthest point of the part
     for (size_t k = 0; k < 3; ++k) to.points[k] = from.points[corners[k]], to.distances[k] = from.distances[corners[k]];
     for (size_t k = 0; k < 3; ++k) to.points[3 + k] = 0.5 * (to.points[k] + to.points[(k + 1) % 3]);
-    for (size_t k = 0; k < 3; ++k)
-      reach[k] = std::max(glm::length(to.points[(k + 1) % 3] - to.points[k]),
-                          glm::length(to.points[(k + 2) % 3] - to.points[k]));
+    const std::array<double, 3> reach = reaches({to.points[0], to.points[1], to.points[2]});
     near_.clear();
     for (uint32_t i = 0; i < from.among->size(); ++i) {
       const double least =

@@ -1,9 +1,7 @@
 #include "compress/bake/lod/bound/triangle_subtraction.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include "compress/bake/lod/bound/triangle_distance.h"
+#include <limits>
+#include <tuple>
 
 namespace packtrace {
 
@@ -33,36 +31,48 @@ double TriangleSubtraction::Prism::largest_height(const Polygon& polygon) const 
   return largest;
 }
 
+double TriangleSubtraction::Prism::least_height(const Polygon& polygon) const {
+  double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
+  for (uint32_t i = 0; i < polygon.count; ++i) {
+    const double height = glm::dot(normal, polygon.corners[i]) - offset;
+    lowest = std::min(lowest, height), highest = std::max(highest, height);
+  }
+  return std::max({lowest, -highest, 0.0});
+}
+
+bool TriangleSubtraction::Prism::is_beyond_a_side(const Polygon& polygon) const {
+  for (size_t side = 0; side < 3; ++side) {
+    uint32_t i = 0;
+    while (i < polygon.count && glm::dot(inwards[side], polygon.corners[i]) - limits[side] < 0.0) ++i;
+    if (i == polygon.count) return true;
+  }
+  return false;
+}
+
 TriangleSubtraction::Polygon TriangleSubtraction::split(const Polygon& polygon, const Prism& prism) {
   Polygon inside = polygon;
+  std::array<double, std::tuple_size_v<decltype(Polygon::corners)>> heights;
   for (size_t side = 0; side < 3 && inside.count >= 3; ++side) {
     if (inside.count + 1 > inside.corners.size()) return {};
-    Polygon in, out;
-    DVec3 last = inside.corners[inside.count - 1];
-    double last_height = glm::dot(prism.inwards[side], last) - prism.limits[side];
+    bool is_cut = false;
     for (uint32_t i = 0; i < inside.count; ++i) {
-      const DVec3 next = inside.corners[i];
-      const double height = glm::dot(prism.inwards[side], next) - prism.limits[side];
-      if ((last_height < 0.0) != (height < 0.0)) {
-        const DVec3 between = last + last_height / (last_height - height) * (next - last);
+      heights[i] = glm::dot(prism.inwards[side], inside.corners[i]) - prism.limits[side];
+      is_cut |= heights[i] < 0.0;
+    }
+    if (!is_cut) continue;
+    Polygon in, out;
+    for (uint32_t i = 0, k = inside.count - 1; i < inside.count; k = i++) {
+      const DVec3 &last = inside.corners[k], &next = inside.corners[i];
+      if ((heights[k] < 0.0) != (heights[i] < 0.0)) {
+        const DVec3 between = last + heights[k] / (heights[k] - heights[i]) * (next - last);
         in.add(between), out.add(between);
       }
-      (height < 0.0 ? out : in).add(next);
-      last = next, last_height = height;
+      (heights[i] < 0.0 ? out : in).add(next);
     }
     if (out.count >= 3) next_.push_back(out);
     inside = in;
   }
   return inside;
-}
-
-double TriangleSubtraction::distance(const Polygon& polygon, const std::array<DVec3, 3>& triangle) {
-  double largest2 = 0.0;
-  for (uint32_t i = 0; i < polygon.count; ++i) {
-    const DVec3 d = polygon.corners[i] - nearest_point(polygon.corners[i], triangle[0], triangle[1], triangle[2]);
-    largest2 = std::max(largest2, glm::dot(d, d));
-  }
-  return std::sqrt(largest2);
 }
 
 } // namespace packtrace
