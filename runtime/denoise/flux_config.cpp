@@ -24,6 +24,8 @@ constexpr Setting<FluxConfig> kFluxSettings[] = {
       SettingRule::kPowerOfTwo},
      &F::reprojection_normal_power},
     {{"reprojection_instance_test", "Reject history of another instance", 0, 1}, &F::reprojection_instance_test},
+    {{"reprojection_nearby", "Fraction of the history around a pixel that replaces its own where that is lost", 0, 1},
+     &F::reprojection_nearby},
     {{"passes", "Number of filter passes: the first ones of the steps 1, 2, 4 and 1 pixels", 0, 4}, &F::passes},
     {{"guide_depth", "Relative distance from the other's tangent plane at which two pixels hardly mix", 0, 1},
      &F::guide_depth},

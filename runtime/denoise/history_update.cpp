@@ -50,7 +50,8 @@ public:
     accumulate(input, history, y, row_of(history, y), samples_.row(0));
     if (input.motion != nullptr)
       kernels_.keep_trends(width_, &input.motion->motion_px[static_cast<size_t>(y) * static_cast<size_t>(width_)].x,
-                           history.samples.row(y), input.motion->previous.history.trend.row(y), history.trend.row(y));
+                           history.samples.row(y), reprojection_.weights(), input.motion->previous.history.trend.row(y),
+                           history.trend.row(y));
     update_trends(samples_.row(0).valid, history.mean.row(y), history.samples.row(y), input.longest,
                   history.trend.row(y));
   }

@@ -1,10 +1,36 @@
 #include "runtime/denoise/reprojection.h"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <utility>
 
 #include "runtime/denoise/flux_terms.h"
+
 namespace packtrace {
+namespace {
+
+/// The surface whose history is looked for, and where it was in the previous frame.
+struct LostSurface {
+  float disparity, tolerance;
+  int nx, ny, nz;
+  uint32_t instance;
+};
+
+/// How well a pixel of the previous frame matches: 0 for another surface, up to 1.
+float agreement(const Guides& guides, int y, ptrdiff_t at, const LostSurface& lost, const FluxConfig& config) {
+  const float there = guides.disparity.row(y)[at], distance = std::abs(there - lost.disparity);
+  if (!(there > 0.0f) || !(distance <= 2.0f * lost.tolerance)) return 0.0f;
+  if (config.reprojection_instance_test && guides.instance.row(y)[at] != lost.instance) return 0.0f;
+  const int dot = guides.normal_x.row(y)[at] * lost.nx + guides.normal_y.row(y)[at] * lost.ny +
+                  guides.normal_z.row(y)[at] * lost.nz;
+  float cosine = std::clamp(1.1f * (kNormalUnit * kNormalUnit) * static_cast<float>(dot), 0.0f, 1.0f);
+  for (uint32_t power = config.reprojection_normal_power; power > 1; power /= 2) cosine *= cosine;
+  return lost.tolerance / std::max(distance, lost.tolerance) * cosine;
+}
+
+} // namespace
+
 ReprojectionRows::ReprojectionRows(ImageSize size, const FluxConfig& config, const HistoryKernels& kernels)
     : config_(config), kernels_(kernels), width_(static_cast<int>(size.width)) {
   const size_t padded = static_cast<size_t>(size.width) + kRunPadding;
@@ -59,7 +85,40 @@ HistoryRow ReprojectionRows::at(const MotionFrame& frame, int y) {
              {result_.mean + x, result_.square + x, result_.fast + x, result_.samples + x}, weights_ + x);
     x = end;
   }
+  if (config_.reprojection_nearby > 0.0f) look_nearby(frame, y);
   return result_;
+}
+
+/// Replaces lost histories of row y by those nearby.
+void ReprojectionRows::look_nearby(const MotionFrame& frame, int y) {
+  const Guides &now = frame.guides, &then = frame.previous.guides;
+  const History& h = frame.previous.history;
+  for (int x = 0; x < width_; ++x) {
+    if (weights_[x] > kLostWeight || !(located_.disparity[x] > 0.0f)) continue;
+    const LostSurface lost{located_.disparity[x],  located_.tolerance[x],  now.normal_x.row(y)[x],
+                           now.normal_y.row(y)[x], now.normal_z.row(y)[x], now.instance.row(y)[x]};
+    // The square lies around the nearest pixel of the footprint, and inside the planes' borders.
+    const float fx = located_.fraction_x[x], fy = located_.fraction_y[x];
+    const int right = fx >= 0.5f ? 1 : 0, down = fy >= 0.5f ? 1 : 0;
+    const ptrdiff_t corner = ptrdiff_t{located_.offset[x]} + x;
+    float weight = 0.0f, mean = 0.0f, square = 0.0f, fast = 0.0f, samples = 0.0f;
+    for (int dy = down - kNearbyRadius; dy <= down + kNearbyRadius; ++dy)
+      for (int dx = right - kNearbyRadius; dx <= right + kNearbyRadius; ++dx) {
+        const ptrdiff_t at = corner + dy * h.mean.stride() + dx;
+        const float away_x = static_cast<float>(dx) - fx, away_y = static_cast<float>(dy) - fy;
+        const float near = 1.0f - (away_x * away_x + away_y * away_y) * (1.0f / (kNearbyReach * kNearbyReach));
+        const float count = h.samples.row(y)[at];
+        if (!(near > 0.0f) || !(count > 0.0f)) continue;
+        const float part = near * near * agreement(then, y, at, lost, config_);
+        weight += part, mean += part * h.mean.row(y)[at], square += part * h.square.row(y)[at];
+        fast += part * h.fast.row(y)[at], samples += part * count;
+      }
+    if (!(weight > kMinHistoryWeight)) continue;
+    const float scale = 1.0f / weight;
+    result_.mean[x] = std::min(mean * scale, 1.0f);
+    result_.square[x] = square * scale, result_.fast[x] = fast * scale;
+    result_.samples[x] = config_.reprojection_nearby * std::min(samples * scale, longest_moving(config_));
+  }
 }
 
 } // namespace packtrace

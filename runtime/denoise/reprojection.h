@@ -31,6 +31,9 @@ struct MotionFrame {
 /// Where the neighbourhood lies on one surface, the AO mean is interpolated with bicubic precision along each axis, so
 /// that camera pans do not blur it.
 /// The sample count is scaled by the sum of the weights, so partial agreement shortens the history.
+/// Where that sum is at most kLostWeight, as on edges thinner than a pixel, which come and go between the camera rays,
+/// the history starts from the weighted mean of nearby pixels of the surface, but with a part of their length only
+/// (FluxConfig::reprojection_nearby).
 /// Depth is compared where the surface was: tolerances are those of its disparity in the previous frame, with the
 /// change of disparity per pixel scaled in proportion.
 ///
@@ -42,8 +45,12 @@ public:
 
   /// Returns row y of the history, 0 where it is rejected, valid until the next call.
   HistoryRow at(const MotionFrame& frame, int y);
+  /// The sums of the weights of the last row's footprints.
+  const float* weights() const { return weights_; }
 
 private:
+  void look_nearby(const MotionFrame& frame, int y);
+
   const FluxConfig& config_;
   const HistoryKernels& kernels_;
   int width_;

@@ -20,6 +20,7 @@ gpu::DenoiseRecord terms_of(const FluxConfig& config) {
   gpu::DenoiseRecord out{};
   out.slope = config.reprojection_slope;
   out.longest_still = static_cast<float>(config.max_tspp), out.longest_moving = longest_moving(config);
+  out.nearby = config.reprojection_nearby;
   out.fast_frames = static_cast<float>(config.fast_frames);
   const CorrectTerms correct = correct_terms(config);
   out.fast_share = correct.fast_share, out.gamma = correct.gamma;

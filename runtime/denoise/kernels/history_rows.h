@@ -17,6 +17,14 @@ inline constexpr int32_t kNoOffset = INT32_MIN;
 /// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
 inline constexpr float kMinHistoryWeight = 1e-3f;
 
+/// Up to this weight histories of nearby pixels replace that of the footprint.
+inline constexpr float kLostWeight = 0.2f;
+
+/// Nearby pixels are those in a square of 2 kNearbyRadius + 1 pixels around the nearest one. Their weights fall to 0 at
+/// the distance kNearbyReach.
+inline constexpr int kNearbyRadius = 2;
+inline constexpr float kNearbyReach = 3.0f;
+
 /// Footprints with a smaller total weight cross an edge, where sharpening would overshoot.
 inline constexpr float kMinSharpenWeight = 0.9f;
 
@@ -117,9 +125,11 @@ struct HistoryKernels {
   /// Adds samples to a row of the history, perhaps in place.
   void (*accumulate)(int width, const float* ao, const float* disparity, const HistoryLengths& longest,
                      const PastRow& past, const HistoryRow& history, const SampleRow& samples);
-  /// Trends of a resampled row: pixels that did not move keep theirs, unless this is their first sample.
+  /// Trends of a resampled row: pixels that did not move keep theirs, unless their history was lost.
   /// @param motion x and y of each pixel's motion in pixels
-  void (*keep_trends)(int width, const float* motion, const float* samples, const uint32_t* before, uint32_t* trend);
+  /// @param weights of the footprints
+  void (*keep_trends)(int width, const float* motion, const float* samples, const float* weights,
+                      const uint32_t* before, uint32_t* trend);
   /// Whether a pixel's sample made its history, shorter than `longest`, reach or cross a power of two.
   bool (*any_crosses)(int width, const float* valid, const float* samples, float longest);
   /// Sums along x, by the window's radius. Samples are read up to the radius outside the row.

@@ -190,12 +190,12 @@ void accumulate_row(int width, const float* ao, const float* disparity, const Hi
   }
 }
 
-void keep_trends_row(int width, const float* motion, const float* samples, const uint32_t* before,
+void keep_trends_row(int width, const float* motion, const float* samples, const float* weights, const uint32_t* before,
                      uint32_t* __restrict trend) {
   for (int x = 0; x < width; ++x) {
     const bool still = (std::abs(motion[2 * x]) <= kStillMotion) & (std::abs(motion[2 * x + 1]) <= kStillMotion);
     const uint32_t kept = before[x];
-    trend[x] = still & (samples[x] > 1.0f) ? kept : 0u;
+    trend[x] = still & (samples[x] > 1.0f) & (weights[x] > kLostWeight) ? kept : 0u;
   }
 }
 

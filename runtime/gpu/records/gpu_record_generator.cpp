@@ -73,6 +73,9 @@ void write_denoiser_constants(std::ostream& out) {
   write(out, "kStillMotion", kStillMotion);
   write(out, "kNormalUnit", kNormalUnit);
   write(out, "kMinHistoryWeight", kMinHistoryWeight);
+  write(out, "kLostWeight", kLostWeight);
+  write(out, "kNearbyRadius", uint32_t{kNearbyRadius});
+  write(out, "kNearbyReach", kNearbyReach);
   write(out, "kMinSharpenWeight", kMinSharpenWeight);
   write(out, "kAoUnits", float{kAoUnits});
   write(out, "kPrecisionUnits", kPrecisionUnits);

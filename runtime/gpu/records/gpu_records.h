@@ -128,7 +128,7 @@ inline constexpr uint32_t kLastPass = 1u << 7;      ///< of the filter: writes t
 /// and VarianceTerms.
 struct DenoiseRecord {
   uint32_t width, height, flags;
-  float depth, slope, longest_still, longest_moving;
+  float depth, slope, longest_still, longest_moving, nearby;
   float longest, fast_frames;
   float fast_share, gamma, change_tolerance, response;
   float guide_depth, guide_slope, guide_bend;

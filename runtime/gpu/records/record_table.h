@@ -180,6 +180,7 @@ inline constexpr std::array kDenoiseFields = {
     GlslField{"float", "slope", offsetof(DenoiseRecord, slope)},
     GlslField{"float", "longest_still", offsetof(DenoiseRecord, longest_still)},
     GlslField{"float", "longest_moving", offsetof(DenoiseRecord, longest_moving)},
+    GlslField{"float", "nearby", offsetof(DenoiseRecord, nearby)},
     GlslField{"float", "longest", offsetof(DenoiseRecord, longest)},
     GlslField{"float", "fast_frames", offsetof(DenoiseRecord, fast_frames)},
     GlslField{"float", "fast_share", offsetof(DenoiseRecord, fast_share)},

@@ -137,7 +137,30 @@ float sharpened(float linear, Located l, uint instance) {
   return lesser(greater(sharp, 0.0), 1.0);
 }
 
-Past resampled(ivec2 p, uvec4 guide, vec2 motion, bool still) {
+// The history of the surface around its previous position, if there is any.
+bool nearby(Located l, uvec4 guide, ivec3 normal, out Past past) {
+  const int radius = int(kNearbyRadius);
+  ivec2 nearest = ivec2(greaterThanEqual(l.fraction, vec2(0.5)));
+  Gathered sum = Gathered(0.0, 0.0, 0.0, 0.0, 0.0);
+  for (int y = nearest.y - radius; y <= nearest.y + radius; ++y)
+    for (int x = nearest.x - radius; x <= nearest.x + radius; ++x) {
+      precise vec2 away = vec2(x, y) - l.fraction;
+      precise float near = 1.0 - (away.x * away.x + away.y * away.y) * (1.0 / (kNearbyReach * kNearbyReach));
+      precise float weight = near * near;
+      if (near > 0.0) gather(sum, l.corner + ivec2(x, y), weight, l, guide, normal);
+    }
+  past = Past(0.0, 0.0, 0.0, 0.0);
+  if (!(sum.weight > kMinHistoryWeight)) return false;
+  float scale = quotient(1.0, sum.weight);
+  precise float mean = lesser(sum.mean * scale, 1.0), square = sum.square * scale, fast = sum.fast * scale;
+  precise float frames = terms.nearby * lesser(sum.frames * scale, terms.longest_moving);
+  past = Past(mean, square, fast, frames);
+  return true;
+}
+
+// @param lost whether the pixel's own history is lost
+Past resampled(ivec2 p, uvec4 guide, vec2 motion, bool still, out bool lost) {
+  lost = true;
   Located l = locate(p, uintBitsToFloat(guide.x), motion, still);
   if (!l.found) return Past(0.0, 0.0, 0.0, 0.0);
   ivec3 normal = normal_of(guide.y, guide.z);
@@ -148,6 +171,11 @@ Past resampled(ivec2 p, uvec4 guide, vec2 motion, bool still) {
   if (fx > 0.0) gather(sum, l.corner + ivec2(1, 0), w10, l, guide, normal);
   if (fy > 0.0) gather(sum, l.corner + ivec2(0, 1), w01, l, guide, normal);
   if (fx > 0.0 && fy > 0.0) gather(sum, l.corner + ivec2(1, 1), w11, l, guide, normal);
+  lost = sum.weight <= kLostWeight;
+  if (lost && terms.nearby > 0.0) {
+    Past around;
+    if (nearby(l, guide, normal, around)) return around;
+  }
   if (!(sum.weight > kMinHistoryWeight)) return Past(0.0, 0.0, 0.0, 0.0);
   float scale = quotient(1.0, sum.weight);
   precise float mean = sum.mean * scale, mean_square = sum.square * scale, fast = sum.fast * scale;
@@ -187,7 +215,7 @@ void main() {
     guides_now[i] = guide;
   }
   bool moves = has(kFollowMotion) && changes[0] != 0u;
-  bool still = true;
+  bool still = true, lost = false;
   Past past = Past(0.0, 0.0, 0.0, 0.0);
   uint trend = 0u;
   if (has(kHasHistory)) {
@@ -195,7 +223,7 @@ void main() {
     if (moves) {
       vec2 motion = motions[i];
       still = is_still(motion);
-      past = resampled(p, guide, motion, still);
+      past = resampled(p, guide, motion, still, lost);
     } else {
       past = past_of(i);
     }
@@ -212,7 +240,7 @@ void main() {
   precise float fast = past.fast + (value - past.fast) * fast_share;
   precise float square = past.square + (value * value - past.square) * share;
   float frames = valid ? count : lesser(past.frames, terms.longest);
-  if (moves) trend = still && frames > 1.0 ? trend : 0u;
+  if (moves) trend = still && frames > 1.0 && !lost ? trend : 0u;
   if (valid && frames < terms.longest && crosses_power_of_two(frames)) trend = next_trend(trend, mean, frames);
   history_now[i] = vec2(mean, frames);
   history_now[pixel_count() + i] = vec2(square, fast);

@@ -54,6 +54,7 @@ TEST(DenoiserConfig, EndsOfEveryRangeAreAcceptedAndWhatLiesBeyondIsRejected) {
   expect_float_range(&FluxConfig::change_response, 0.0f, 100.0f);
   expect_float_range(&FluxConfig::reprojection_depth, 0.0f, 1.0f);
   expect_float_range(&FluxConfig::reprojection_slope, 0.0f, 10.0f);
+  expect_float_range(&FluxConfig::reprojection_nearby, 0.0f, 1.0f);
   expect_float_range(&FluxConfig::guide_depth, 0.0f, 1.0f);
   expect_float_range(&FluxConfig::guide_slope, 0.0f, 10.0f);
   expect_float_range(&FluxConfig::guide_bend, 0.0f, 10.0f);

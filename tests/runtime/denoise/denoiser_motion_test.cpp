@@ -93,7 +93,9 @@ TEST(AoDenoiser, SurfacesThatComeNearerKeepTheirHistory) {
 }
 
 TEST(AoDenoiser, MovingInstancesKeepHistoryAndWhatTheyUncoverHasNone) {
-  AoDenoiser denoiser;
+  DenoiserConfig config;
+  config.ours.reprojection_nearby = 0.0f;
+  AoDenoiser denoiser(config), nearby;
   for (uint32_t f = 0; f < 24; ++f) { // a card that moves right by 3 pixels and nearer by 5 % a frame
     GBuffer g = wall(kSize);
     g.previous_z = g.view_z;
@@ -106,13 +108,45 @@ TEST(AoDenoiser, MovingInstancesKeepHistoryAndWhatTheyUncoverHasNone) {
       if (f > 0) g.motion_px[i] = Vec2(3, 0);
     }
     const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, 0.5f, f));
+    const DenoisedAo& begun = nearby.next_frame(g, noise(kSize, 0.5f, f));
     if (f == 0) continue;
     const uint32_t left = 20 + 3 * f;
     const float length = static_cast<float>(f + 1), moving = static_cast<float>(std::min(f + 1, kMovingFrames));
     EXPECT_GT(mean_of(result.tspp, kSize, {left + 3, 24, left + 27, 72}), 0.8f * moving) << "on the card, frame " << f;
     EXPECT_EQ(mean_of(result.tspp, kSize, {left - 3, 20, left, 76}), 1.0) << "uncovered, frame " << f;
+    const double next_to_wall = mean_of(begun.tspp, kSize, {left - 3, 24, left - 2, 72});
+    EXPECT_GT(next_to_wall, 1.3) << "frame " << f;
+    EXPECT_LE(next_to_wall, 1.0 + 0.36 * config.ours.max_tspp_moving) << "frame " << f;
+    EXPECT_EQ(mean_of(begun.tspp, kSize, {left - 1, 24, left, 72}), 1.0) << "too far from the wall, frame " << f;
     EXPECT_GT(mean_of(result.tspp, kSize, {0, 80, kSize.width, 96}), 0.8f * length) << "still, frame " << f;
   }
+}
+
+/// RMSE on edges thinner than a pixel: of every sixth row, every other pixel shows them, in turn from frame to frame.
+double rmse_of_thin_edges(float nearby) {
+  DenoiserConfig config;
+  config.ours.reprojection_nearby = nearby;
+  AoDenoiser denoiser(config);
+  const ImageSize size{96, 60};
+  double sum = 0, count = 0;
+  for (uint32_t f = 0; f < 24; ++f) {
+    GBuffer g = wall(size);
+    for (uint32_t y = 3; y < size.height; y += 6)
+      for (uint32_t x = f % 2; x < size.width; x += 2)
+        g.view_z[y * size.width + x] = 8.0f, g.instance[y * size.width + x] = 1;
+    const DenoisedAo& result =
+        denoiser.next_frame(g, samples(size, [&](uint32_t x, uint32_t y) {
+                              return noisy(g.instance[y * size.width + x] == 1 ? 0.6f : 0.2f, x, y, f);
+                            }));
+    for (uint32_t i = 0; i < size.pixels() && f >= 8; ++i)
+      if (g.instance[i] == 1) sum += std::pow(double{result.ao[i]} - double{expected(0.6f)}, 2.0), count += 1;
+  }
+  return std::sqrt(sum / count);
+}
+
+TEST(AoDenoiser, EdgesThinnerThanAPixelStartFromTheHistoryAround) {
+  const double without = rmse_of_thin_edges(0.0f), with = rmse_of_thin_edges(FluxConfig{}.reprojection_nearby);
+  EXPECT_LT(with, 0.8 * without) << "without: " << without;
 }
 
 /// PSNR after 64 frames of a wall with smooth occlusion that moves by `pan` pixels per frame.

@@ -267,6 +267,8 @@ TEST_F(GpuDenoiserTest, Settings) {
                               "change_response=50",
                               "reprojection_depth=0.2",
                               "reprojection_slope=5",
+                              "reprojection_nearby=0",
+                              "reprojection_nearby=1",
                               "guide_depth=0.5",
                               "guide_slope=4",
                               "guide_bend=0",
