@@ -24,8 +24,15 @@ json to_json(const SequenceScore& s) {
   for (const auto& [frames, i] : s.images)
     images.push_back({{"frames", frames}, {"psnr", i.psnr}, {"ssim", i.ssim}, {"flip", i.flip}, {"bias", i.bias}});
   for (const auto& [frames, left] : s.ghosts) ghosts.push_back({{"frames", frames}, {"left", left}});
-  return {{"scene", s.scene}, {"motion", s.motion},   {"denoiser", s.denoiser},         {"images", images},
-          {"ghosts", ghosts}, {"flicker", s.flicker}, {"add_frame_ms", s.add_frame_ms}, {"denoise_ms", s.denoise_ms}};
+  return {{"scene", s.scene},
+          {"motion", s.motion},
+          {"denoiser", s.denoiser},
+          {"images", images},
+          {"ghosts", ghosts},
+          {"flicker", s.flicker},
+          {"truth_flicker", s.truth_flicker},
+          {"add_frame_ms", s.add_frame_ms},
+          {"denoise_ms", s.denoise_ms}};
 }
 
 /// @param first the first denoiser's score of the same sequence
@@ -36,6 +43,9 @@ void print(const SequenceScore& s, const SequenceScore& first) {
   for (const auto& [frames, left] : s.ghosts)
     fmt::print("{:10} {:10} {:9} {:3} frames after the occluder is gone: {:.2f} % of it left\n", s.scene, s.motion,
                s.denoiser, frames, 100.0 * left);
+  if (s.truth_flicker > 0.0)
+    fmt::print("{:10} {:10} the truth of the first two frames flickers by {:.5f}\n", s.scene, s.motion,
+               s.truth_flicker);
   fmt::print("{:10} {:10} {:9} flicker {:.5f}; ms: add_frame {:.2f}, denoise {:.2f}\n", s.scene, s.motion, s.denoiser,
              s.flicker, s.add_frame_ms, s.denoise_ms);
 }

@@ -77,10 +77,16 @@ public:
   }
 
   void add(const GBuffer& g, const std::vector<float>& ao, uint32_t frame) {
-    if (frame > frames_ / 2 && frame < frames_)
-      for (uint32_t y = 0; y < g.size.height; ++y)
-        for (uint32_t x = 0; x < g.size.width; ++x) compare(g, ao, x, y);
+    if (frame > frames_ / 2 && frame < frames_) compare(g, ao);
+    keep(g, ao);
+  }
+  void keep(const GBuffer& g, const std::vector<float>& ao) {
     before_ = ao, before_z_ = g.view_z, before_instance_ = g.instance;
+  }
+  /// With the frame that was kept.
+  void compare(const GBuffer& g, const std::vector<float>& ao) {
+    for (uint32_t y = 0; y < g.size.height; ++y)
+      for (uint32_t x = 0; x < g.size.width; ++x) compare(g, ao, x, y);
   }
   double result() const { return count_ > 0.0 ? sum_ / count_ : 0.0; }
 
@@ -116,6 +122,14 @@ private:
   std::vector<uint32_t> before_instance_;
   double sum_ = 0, count_ = 0;
 };
+
+/// Flicker of exact pictures: that of the truth of the first two frames; 0 if it is not known.
+double flicker_of_truth(const DenoiserSequence& s) {
+  if (s.kind == SequenceKind::kOccluder || !s.truth.contains(1) || !s.truth.contains(2)) return 0.0;
+  Flicker flicker(s);
+  flicker.keep(s.gbuffers[0], s.truth.at(1)), flicker.compare(s.gbuffers[1], s.truth.at(2));
+  return flicker.result();
+}
 
 /// What is left of an occluder that is gone.
 class Ghost {
@@ -175,7 +189,7 @@ SequenceScore score(const DenoiserSequence& sequence, const std::string& name, c
         result.ghosts[since] = ghost->left(image);
   });
   const double to_ms = 1e3 / static_cast<double>(sequence.ao.size());
-  result.flicker = flicker.result();
+  result.flicker = flicker.result(), result.truth_flicker = flicker_of_truth(sequence);
   result.add_frame_ms = add_s * to_ms, result.denoise_ms = denoise_s * to_ms;
   return result;
 }

@@ -27,6 +27,7 @@ struct SequenceScore {
   /// Mean change of a pixel's value since the frame before, following its motion, over the second half of the frames
   /// that move, or of all. Only pixels that show the same surface, and of which the truth stays the same.
   double flicker = 0;
+  double truth_flicker = 0; ///< of the ground truth, between the first two frames of a view that moves; 0: not known
   double add_frame_ms = 0, denoise_ms = 0; ///< a frame
 };
 
