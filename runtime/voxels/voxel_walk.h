@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include <glm/glm.hpp>
 
@@ -12,7 +13,8 @@
 
 namespace packtrace {
 
-/// A ray's way through a grid of voxels, cell by cell, see VoxelTracer.
+/// A ray's way through a grid of voxels, cell by cell, see VoxelTracer. The three axes are lanes of one vector, so that
+/// a step has no branches but those that end it; the fourth lane stands still.
 template <class Real>
 class VoxelWalk {
 public:
@@ -20,134 +22,169 @@ public:
 
   VoxelWalk(V3 origin, V3 direction) {
     for (int a = 0; a < 3; ++a)
-      origin_[at(a)] = origin[a], direction_[at(a)] = direction[a], inverse_[at(a)] = Real(1) / direction[a];
+      origin_[a] = origin[a], direction_[a] = direction[a], inverse_[a] = Real(1) / direction[a];
   }
 
   /// Moves to the first voxel that the ray meets from t_min on; false if there is none.
   [[gnu::always_inline]] bool enter(const VoxelIndex& size, Real t_min, Real t_max) {
-    for (size_t a = 0; a < 3; ++a) size_[a] = static_cast<int32_t>(size[a]);
-    t_ = t_min, axis_ = -1;
+    t_ = t_min;
+    int axis = -1;
     for (int a = 0; a < 3; ++a) {
-      if (direction_[at(a)] == Real(0)) {
-        if (!(origin_[at(a)] >= Real(0) && origin_[at(a)] < Real(size_[at(a)]))) return false;
+      size_[a] = static_cast<int32_t>(size[at(a)]);
+      if (direction_[a] == Real(0)) {
+        if (!(origin_[a] >= Real(0) && origin_[a] < Real(size_[a]))) return false;
         continue;
       }
-      const Real near = crossing(a, direction_[at(a)] > Real(0) ? 0 : size_[at(a)]);
-      if (near > t_min && near >= t_) t_ = near, axis_ = a;
+      const Real near = crossing(a, direction_[a] > Real(0) ? 0 : size_[a]);
+      if (near > t_min && near >= t_) t_ = near, axis = a;
     }
     if (!(t_ < t_max)) return false;
     // Everything up to the entry's (t, axis) is crossed, and all that t_min lies behind.
     const auto crossed = [&](int a, int32_t p) {
       const Real t = crossing(a, p);
-      return t < t_ || (t == t_ && (axis_ < 0 || a <= axis_));
+      return t < t_ || (t == t_ && (axis < 0 || a <= axis));
     };
     for (int a = 0; a < 3; ++a) {
-      const int32_t last = size_[at(a)] - 1;
-      const bool up = direction_[at(a)] > Real(0), still = direction_[at(a)] == Real(0);
-      if (!still && crossed(a, up ? last + 1 : 0)) return false;
-      int32_t v = clamp_to(origin_[at(a)] + t_ * direction_[at(a)], 0, last);
-      if (!still)
-        v = up ? last_crossed(v, 0, last, [&](int32_t p) { return crossed(a, p); })
-               : first_uncrossed(v, 0, last, [&](int32_t p) { return crossed(a, p); });
-      voxel_[at(a)] = v;
-      step_[at(a)] = still ? 0 : up ? 1 : -1;
-      next_[at(a)] = leaving(a);
+      exit_[a] = a == axis ? Wide(-1) : Wide(0);
+      const int32_t last = size_[a] - 1;
+      if (direction_[a] == Real(0)) {
+        voxel_[a] = clamp_to(origin_[a], 0, last);
+        stand_still(a);
+        continue;
+      }
+      const bool up = direction_[a] > Real(0);
+      if (crossed(a, up ? last + 1 : 0)) return false;
+      voxel_[a] = settle(up, clamp_to(origin_[a] + t_ * direction_[a], 0, last), 0, last,
+                         [&](int32_t p) { return crossed(a, p); });
+      step_[a] = up ? 1 : -1, plane_step_[a] = up ? Real(1) : Real(-1);
+      plane_[a] = Real(voxel_[a] + (up ? 1 : 0));
     }
+    stand_still(3);
+    find_crossings(plane_, next_);
     return true;
   }
 
   /// Leaves the cell of 2^shift voxels that holds the current one; false if the ray leaves the grid or ends.
   [[gnu::always_inline]] bool leave_cell(uint32_t shift, Real t_max) {
-    if (shift > kSteppedShift) return leave_large_cell(shift, t_max);
-    const std::array<int32_t, 3> from = voxel_;
+    if (shift > kSteppedShift) return leave_large_cell(shift, t_max) && in_grid();
+    const Ints from = voxel_;
     do
-      if (!leave_voxel(t_max)) return false;
-    while (((voxel_[0] ^ from[0]) | (voxel_[1] ^ from[1]) | (voxel_[2] ^ from[2])) >> shift == 0);
-    return true;
+      if (!advance(t_max)) return false;
+    while (stays(from, shift));
+    return in_grid();
   }
 
   Real t() const { return t_; }
-  int axis() const { return axis_; }
+  /// Of the face that the ray entered the voxel through; -1 if it began inside.
+  int axis() const { return exit_[0] != 0 ? 0 : exit_[1] != 0 ? 1 : exit_[2] != 0 ? 2 : -1; }
   VoxelIndex voxel() const {
     return {static_cast<uint32_t>(voxel_[0]), static_cast<uint32_t>(voxel_[1]), static_cast<uint32_t>(voxel_[2])};
   }
 
 private:
-  static constexpr uint32_t kSteppedShift =
-      1; ///< of cells that are left voxel by voxel, which is faster for small ones
+  using Ints [[gnu::vector_size(16)]] = int32_t;
+  using Reals [[gnu::vector_size(4 * sizeof(Real))]] = Real;
+  using Wide = std::conditional_t<sizeof(Real) == 4, int32_t, int64_t>;
+  using Masks [[gnu::vector_size(4 * sizeof(Real))]] = Wide; // what comparisons of Reals give
+
+  static constexpr uint32_t kSteppedShift = 1; // of cells that are left voxel by voxel, which is faster for small ones
+  static constexpr Real kNever = std::numeric_limits<Real>::infinity();
 
   static constexpr size_t at(int axis) { return static_cast<size_t>(axis); }
   [[gnu::always_inline]] Real crossing(int axis, int32_t plane) const {
-    return (Real(plane) - origin_[at(axis)]) * inverse_[at(axis)];
+    return (Real(plane) - origin_[axis]) * inverse_[axis];
   }
-  /// Where the ray leaves the current voxel along an axis; infinite if it does not.
-  [[gnu::always_inline]] Real leaving(int axis) const {
-    constexpr Real kNever = std::numeric_limits<Real>::infinity();
-    if (step_[at(axis)] == 0) return kNever;
-    const Real t = crossing(axis, voxel_[at(axis)] + (step_[at(axis)] > 0 ? 1 : 0));
-    return t < kNever ? t : kNever; // also for a NaN
+  /// Keeps a lane from being chosen: the t of its planes is infinite or, of plane 0, no number.
+  [[gnu::always_inline]] void stand_still(int lane) {
+    origin_[lane] = direction_[lane] = 0, inverse_[lane] = kNever, plane_[lane] = 0;
   }
 
-  /// Of equal t the lower axis.
-  static int first_axis(const std::array<Real, 3>& t) {
-    return t[0] <= t[1] ? (t[0] <= t[2] ? 0 : 2) : (t[1] <= t[2] ? 1 : 2);
+  /// Where the ray crosses a plane of each axis; infinite if it does not, also for a NaN.
+  [[gnu::always_inline]] void find_crossings(const Reals& planes, Reals& t) const {
+    const Reals found = (planes - origin_) * inverse_, never = Reals{} + kNever;
+    t = found < never ? found : never;
   }
 
-  /// Along a rising axis: the last of the planes low..high that is crossed, or low.
+  /// Chooses the lane of the smallest t, of equal ones the lowest axis; t_ becomes its t.
+  [[gnu::always_inline]] void choose_exit(const Reals& t) {
+    constexpr Masks kLower1{-1, -1, 0, 0}, kLower2{-1, 0, 0, 0}; // lanes whose axis is below the shuffled one's
+    const Reals t1 = __builtin_shufflevector(t, t, 1, 2, 0, 3), t2 = __builtin_shufflevector(t, t, 2, 0, 1, 3);
+    exit_ = ((t < t1) | ((t <= t1) & kLower1)) & ((t < t2) | ((t <= t2) & kLower2));
+    const Reals least = t1 < t2 ? t1 : t2;
+    t_ = (t < least ? t : least)[0];
+  }
+
+  /// Enters the next voxel, which may lie outside the grid; false if the ray ends before.
+  [[gnu::always_inline]] bool advance(Real t_max) {
+    choose_exit(next_);
+    if (!(t_ < t_max)) return false;
+    voxel_ += step_ & __builtin_convertvector(exit_, Ints);
+    plane_ += reinterpret_cast<Reals>(reinterpret_cast<Masks>(plane_step_) & exit_);
+    find_crossings(plane_, next_);
+    return true;
+  }
+
+  [[gnu::always_inline]] bool stays(const Ints& from, uint32_t shift) const {
+    const Ints changed = voxel_ ^ from;
+    return (changed[0] | changed[1] | changed[2]) >> shift == 0;
+  }
+  [[gnu::always_inline]] bool in_grid() const {
+    const Ints out = (voxel_ < 0) | (voxel_ >= size_);
+    return (out[0] | out[1] | out[2]) == 0;
+  }
+
+  /// The voxel of low..high along an axis such that of the planes between them those are crossed that the ray passes
+  /// before it.
   template <class Crossed>
-  [[gnu::always_inline]] static int32_t last_crossed(int32_t guess, int32_t low, int32_t high, const Crossed& crossed) {
-    while (guess < high && crossed(guess + 1)) ++guess;
-    while (guess > low && !crossed(guess)) --guess;
+  [[gnu::always_inline]] static int32_t settle(bool up, int32_t guess, int32_t low, int32_t high,
+                                               const Crossed& crossed) {
+    if (up) {
+      while (guess < high && crossed(guess + 1)) ++guess;
+      while (guess > low && !crossed(guess)) --guess;
+    } else {
+      while (guess > low && crossed(guess)) --guess;
+      while (guess < high && !crossed(guess + 1)) ++guess;
+    }
     return guess;
-  }
-  /// Along a falling axis: the voxel of low..high above the first plane that is not crossed.
-  template <class Crossed>
-  [[gnu::always_inline]] static int32_t first_uncrossed(int32_t guess, int32_t low, int32_t high,
-                                                        const Crossed& crossed) {
-    while (guess > low && crossed(guess)) --guess;
-    while (guess < high && !crossed(guess + 1)) ++guess;
-    return guess;
-  }
-
-  [[gnu::always_inline]] bool leave_voxel(Real t_max) {
-    const int exit = first_axis(next_);
-    if (!(next_[at(exit)] < t_max)) return false;
-    return cross(exit, next_[at(exit)], voxel_[at(exit)] + step_[at(exit)]);
   }
 
   [[gnu::always_inline]] bool leave_large_cell(uint32_t shift, Real t_max) {
-    constexpr Real kNever = std::numeric_limits<Real>::infinity();
-    std::array<int32_t, 3> low;
-    std::array<Real, 3> t_plane;
-    for (int a = 0; a < 3; ++a) {
-      low[at(a)] = voxel_[at(a)] >> shift << shift;
-      const Real t = crossing(a, low[at(a)] + (step_[at(a)] > 0 ? 1 << shift : 0));
-      t_plane[at(a)] = step_[at(a)] != 0 && t < kNever ? t : kNever;
-    }
-    const int exit = first_axis(t_plane);
-    const Real t_exit = t_plane[at(exit)];
-    if (!(t_exit < t_max)) return false;
-    for (int a = 0; a < 3; ++a) {
-      if (a == exit || step_[at(a)] == 0) continue;
-      const int32_t first = voxel_[at(a)], high = low[at(a)] + (1 << shift) - 1;
-      const auto before_exit = [&](int32_t p) {
-        const Real t = crossing(a, p);
-        return t < t_exit || (t == t_exit && a < exit);
-      };
-      const Real position = origin_[at(a)] + t_exit * direction_[at(a)];
-      voxel_[at(a)] = step_[at(a)] > 0
-                          ? last_crossed(clamp_to(position, first, high), first, high, before_exit)
-                          : first_uncrossed(clamp_to(position, low[at(a)], first), low[at(a)], first, before_exit);
-      next_[at(a)] = leaving(a);
-    }
-    return cross(exit, t_exit, step_[at(exit)] > 0 ? low[at(exit)] + (1 << shift) : low[at(exit)] - 1);
+    const int32_t size = 1 << shift;
+    const Ints low = voxel_ & -size, rising = step_ > 0;
+    Reals t;
+    find_crossings(__builtin_convertvector(low + (size & rising), Reals), t);
+    choose_exit(t);
+    if (!(t_ < t_max)) return false;
+    // Along the other axes: the voxel at t, if the plane behind it is crossed and the one ahead is not.
+    const Ints first = rising ? voxel_ : low, last = rising ? low + (size - 1) : voxel_;
+    const Reals from = __builtin_convertvector(first, Reals), to = __builtin_convertvector(last, Reals);
+    Reals position = origin_ + t_ * direction_;
+    position = position > from ? position : from;
+    position = position < to ? position : to;
+    const Ints guess = __builtin_convertvector(position, Ints);
+    const Reals t_ahead = (__builtin_convertvector(guess + (rising & 1), Reals) - origin_) * inverse_,
+                t_behind = (__builtin_convertvector(guess + (~rising & 1), Reals) - origin_) * inverse_,
+                t_exit = Reals{} + t_;
+    const Masks lower = exit_[0] != 0 ? Masks{} : exit_[1] != 0 ? Masks{-1, 0, 0, 0} : Masks{-1, -1, 0, 0};
+    const Masks crossed_ahead = (t_ahead < t_exit) | ((t_ahead == t_exit) & lower),
+                crossed_behind = (t_behind < t_exit) | ((t_behind == t_exit) & lower);
+    const Ints exit = __builtin_convertvector(exit_, Ints), others = (step_ != 0) & ~exit,
+               wrong = others & __builtin_convertvector(crossed_ahead | ~crossed_behind, Ints);
+    voxel_ = exit ? (rising ? low + size : low - 1) : others ? guess : voxel_;
+    if ((wrong[0] | wrong[1] | wrong[2]) != 0) settle_lanes(first, last, others, lower);
+    plane_ = __builtin_convertvector(voxel_ + (rising & 1), Reals);
+    find_crossings(plane_, next_);
+    return true;
   }
 
-  /// Enters a voxel through a plane; false if the grid ends there.
-  [[gnu::always_inline]] bool cross(int axis, Real t, int32_t voxel) {
-    t_ = t, axis_ = axis, voxel_[at(axis)] = voxel;
-    next_[at(axis)] = leaving(axis);
-    return static_cast<uint32_t>(voxel) < static_cast<uint32_t>(size_[at(axis)]);
+  /// Corrects the guesses of `others` within low..high.
+  [[gnu::noinline]] void settle_lanes(const Ints& low, const Ints& high, const Ints& others, const Masks& lower) {
+    for (int a = 0; a < 3; ++a)
+      if (others[a] != 0)
+        voxel_[a] = settle(step_[a] > 0, voxel_[a], low[a], high[a], [&](int32_t p) {
+          const Real t = crossing(a, p);
+          return t < t_ || (t == t_ && lower[a] != 0);
+        });
   }
 
   /// Rounds down; a NaN becomes the lower end.
@@ -155,11 +192,12 @@ private:
     return value >= Real(high) ? high : value > Real(low) ? static_cast<int32_t>(value) : low;
   }
 
-  std::array<Real, 3> origin_, direction_, inverse_; // not vec: its [] is a branch
-  std::array<int32_t, 3> size_{}, voxel_{}, step_{};
-  std::array<Real, 3> next_{}; ///< where the ray leaves the voxel along each axis
+  Reals origin_{}, direction_{}, inverse_{};
+  Reals plane_{}, plane_step_{}; // the plane that the ray leaves the voxel through along each axis; 1, -1 or 0
+  Reals next_{};                 // t of those planes
+  Ints size_{}, voxel_{}, step_{};
+  Masks exit_{}; // all bits of the lane whose plane was crossed last
   Real t_ = 0;
-  int axis_ = -1;
 };
 
 } // namespace packtrace
