@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -10,93 +12,99 @@
 
 namespace packtrace {
 
-/// A binary tree over the boxes of things, split in the middle of their longest extent.
+/// A tree over the boxes of things, four boxes to a node. Boxes are tested in floats, widened by what that loses.
 class ThingTree {
 public:
   ThingTree() = default;
-  explicit ThingTree(std::vector<Bounds> boxes) : boxes_(std::move(boxes)), order_(boxes_.size()) {
-    for (size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<uint32_t>(i);
-    if (!order_.empty()) build(0, order_.size());
-  }
+  /// @param boxes of things that are numbered in this order; not empty ones
+  explicit ThingTree(const std::vector<Bounds>& boxes);
 
-  /// Visits things whose boxes a ray meets before t_max, in no order: t_max = visit(thing, t_max). Ends once that is
-  /// not above t_min.
+  /// Visits things whose boxes a ray meets before t_max, roughly near ones first: t_max = visit(thing, t_max). Ends
+  /// once that is not above t_min.
   template <class Visit>
   void visit(DVec3 origin, DVec3 direction, double t_min, double t_max, const Visit& visit) const {
-    if (nodes_.empty()) return;
-    const DVec3 inverse = 1.0 / direction;
-    std::vector<uint32_t>& open = stack();
-    open.assign(1, 0);
-    while (!open.empty() && t_max > t_min) {
-      const Node& node = nodes_[open.back()];
-      const auto number = open.back();
-      open.pop_back();
-      if (!meets(node.box, origin, inverse, t_min, t_max)) continue;
-      if (node.count > 0) {
-        for (uint32_t i = 0; i < node.count && t_max > t_min; ++i) {
-          const uint32_t thing = order_[node.first + i];
-          if (meets(boxes_[thing], origin, inverse, t_min, t_max)) t_max = visit(thing, t_max);
-        }
+    if (nodes_.empty() || !(t_max > t_min)) return;
+    const BoxRay ray((origin - centre_) * scale_, direction * scale_, t_min);
+    std::array<Open, kStack> stack;
+    size_t open = 0;
+    stack[open++] = {0.0f, 0};
+    while (open > 0) {
+      const Open next = stack[--open];
+      if (double{next.t} > t_max) continue;
+      if (next.what < 0) {
+        t_max = visit(static_cast<uint32_t>(~next.what), t_max);
+        if (!(t_max > t_min)) return;
         continue;
       }
-      open.push_back(node.first), open.push_back(number + 1);
+      const Node& node = nodes_[static_cast<size_t>(next.what)];
+      const Floats t = ray.entries(node, t_max);
+      const size_t first = open;
+      for (int i = 0; i < kWidth; ++i) {
+        if (!(t[i] < kMissed)) continue;
+        size_t place = open++; // the farthest lies deepest
+        for (; place > first && stack[place - 1].t < t[i]; --place) stack[place] = stack[place - 1];
+        stack[place] = {t[i], node.child[i]};
+      }
     }
   }
 
-  uint64_t bytes() const {
-    return boxes_.size() * sizeof(Bounds) + order_.size() * sizeof(uint32_t) + nodes_.size() * sizeof(Node);
-  }
+  uint64_t bytes() const { return nodes_.size() * sizeof(Node); }
 
 private:
+  static constexpr int kWidth = 4;
+  static constexpr size_t kAxes = 3;
+  static constexpr size_t kDepth = 16, kStack = kDepth * (kWidth - 1) + 1; // of 2^32 things
+  static constexpr float kMissed = std::numeric_limits<float>::infinity(), kLargest = std::numeric_limits<float>::max();
+  using Floats [[gnu::vector_size(16)]] = float;
+
   struct Node {
-    Bounds box;
-    uint32_t first = 0; ///< leaf: in order_; else the second child; the first one follows the node
-    uint32_t count = 0; ///< 0: not a leaf
+    std::array<Floats, kAxes> low, high; ///< without a child: a box that no ray meets
+    std::array<int32_t, kWidth> child;   ///< a node; below 0: ~thing
+  };
+  struct Open {
+    float t; ///< where the ray enters, or less
+    int32_t what;
   };
 
-  static std::vector<uint32_t>& stack() {
-    thread_local std::vector<uint32_t> open;
-    return open;
-  }
+  /// A ray in the tree's units. Origins are shifted, towards later entries and exits, by more than the floats of origin
+  /// and planes lose.
+  struct BoxRay {
+    std::array<float, kAxes> near_origin, far_origin, inverse;
+    std::array<bool, kAxes> falling;
+    float t_min;
 
-  static bool meets(const Bounds& box, DVec3 origin, DVec3 inverse, double t_min, double t_max) {
-    for (int a = 0; a < 3; ++a) {
-      const double x = (box.lo[a] - origin[a]) * inverse[a], y = (box.hi[a] - origin[a]) * inverse[a];
-      if (x != x || y != y) continue; // the ray lies in a face
-      t_min = std::max(t_min, std::min(x, y) * (1.0 - 1e-12)), t_max = std::min(t_max, std::max(x, y) * (1.0 + 1e-12));
+    BoxRay(DVec3 origin, DVec3 direction, double t_first) : t_min(in_floats(t_first * (1.0 - 0x1p-20))) {
+      for (size_t i = 0; i < kAxes; ++i) {
+        const double o = origin[static_cast<int>(i)], d = direction[static_cast<int>(i)];
+        falling[i] = d < 0.0;
+        const double pad = (falling[i] ? -0x1p-22 : 0x1p-22) * (std::abs(o) + 1.0);
+        inverse[i] = d == 0.0 ? kLargest : in_floats(1.0 / d);
+        near_origin[i] = in_floats(o + pad), far_origin[i] = in_floats(o - pad);
+      }
     }
-    return t_min <= t_max;
-  }
+    static float in_floats(double value) {
+      return static_cast<float>(std::clamp(value, -double{kLargest}, double{kLargest}));
+    }
 
-  void build(size_t begin, size_t end) {
-    const size_t number = nodes_.size();
-    nodes_.emplace_back();
-    Bounds box, centers;
-    for (size_t i = begin; i < end; ++i) {
-      box.extend(boxes_[order_[i]]);
-      centers.extend(0.5 * (boxes_[order_[i]].lo + boxes_[order_[i]].hi));
+    /// Where the ray enters each child's box; kMissed without a hit before t_max.
+    [[gnu::always_inline]] Floats entries(const Node& node, double t_max) const {
+      Floats enter = Floats{} + t_min, leave = Floats{} + in_floats(t_max * (1.0 + 0x1p-20));
+      for (size_t a = 0; a < kAxes; ++a) {
+        const Floats near = ((falling[a] ? node.high : node.low)[a] - near_origin[a]) * inverse[a] * (1.0f - 0x1p-20f),
+                     far = ((falling[a] ? node.low : node.high)[a] - far_origin[a]) * inverse[a] * (1.0f + 0x1p-20f);
+        enter = near > enter ? near : enter; // not for a NaN: the ray lies in a face
+        leave = far < leave ? far : leave;
+      }
+      return enter <= leave ? enter : Floats{} + kMissed;
     }
-    nodes_[number].box = box;
-    if (end - begin <= 2) {
-      nodes_[number].first = static_cast<uint32_t>(begin), nodes_[number].count = static_cast<uint32_t>(end - begin);
-      return;
-    }
-    const DVec3 extent = centers.hi - centers.lo;
-    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-    const size_t middle = (begin + end) / 2;
-    const auto at = [&](size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(begin), at(middle), at(end), [&](uint32_t a, uint32_t b) {
-      const double ca = boxes_[a].lo[axis] + boxes_[a].hi[axis], cb = boxes_[b].lo[axis] + boxes_[b].hi[axis];
-      return ca < cb || (ca == cb && a < b);
-    });
-    build(begin, middle);
-    nodes_[number].first = static_cast<uint32_t>(nodes_.size());
-    build(middle, end);
-  }
+  };
 
-  std::vector<Bounds> boxes_;
-  std::vector<uint32_t> order_;
+  int32_t build(const std::vector<Bounds>& boxes, std::vector<uint32_t>& order, size_t begin, size_t end);
+
   std::vector<Node> nodes_;
+  // The tree's units: (p - centre_) * scale_ lies within -1..1.
+  DVec3 centre_{0.0};
+  double scale_ = 1.0;
 };
 
 } // namespace packtrace

@@ -84,7 +84,7 @@ VoxelScene::VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)
     boxes.push_back(box);
     placed_.push_back({i, number, inverse(world_from_grid), normal_matrix(world_from_grid)});
   }
-  tree_ = ThingTree(std::move(boxes));
+  tree_ = ThingTree(boxes);
 }
 
 template <class Begin, class Found>
