@@ -114,8 +114,9 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;
   print_render(text, result);
   if (result.contains("proxies"))
-    fmt::print(text, "  proxies   occlusion rays see {} instances as voxels\n",
-               result["proxies"]["instances"].get<size_t>());
+    fmt::print(text, "  proxies   occlusion rays see {} instances as voxels{}\n",
+               result["proxies"]["instances"].get<size_t>(),
+               result["proxies"]["instances"] == 0 ? ": none is small, or triangles are faster" : "");
   if (globals.verbosity > 0)
     fmt::print(text, "{}", choices_text(options, globals, camera, config, loaded, first_tracer, timings));
   return 0;

@@ -136,9 +136,11 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
   add_shade_options(verb, options.shade);
   add_tracer_options(verb, options);
   add_lod_options(verb, options.lod);
-  verb.add_option("--proxy-beyond", options.proxy_beyond_px,
-                  "Occlusion rays see instances smaller than so many pixels as their voxels, for .ptk files baked with "
-                  "--proxy voxels")
+  verb.add_option(
+          "--proxy-beyond", options.proxy_beyond_px,
+          "Occlusion rays see instances smaller than so many pixels as their voxels where that makes rays faster: "
+          "if they have many triangles, and enough of the picture shows them. For .ptk files baked with --proxy "
+          "voxels")
       ->type_name("PX")
       ->group("Levels of detail");
   add_sequence_options(verb, options.sequence);

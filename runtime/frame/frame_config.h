@@ -82,8 +82,8 @@ struct FrameConfig {
   AoConfig ao;
   DenoiserConfig denoiser;
   DetailConfig detail;
-  /// Occlusion rays see instances smaller than so many pixels as the proxies of the file (small_instances()), > 0;
-  /// unset: as triangles. Not with levels of detail, interreflection or things that move.
+  /// Occlusion rays see instances smaller than so many pixels as the voxels of the file where that makes them faster
+  /// (ProxyChoice), > 0; unset: as triangles. Not with levels of detail, interreflection or things that move.
   std::optional<double> proxy_beyond_px;
 
   bool shades() const { return view != FrameView::kAo; }

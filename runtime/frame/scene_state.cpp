@@ -9,6 +9,7 @@
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/mesh_motion.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/voxels/proxy_choice.h"
 #include "runtime/voxels/proxy_tracer.h"
 
 namespace packtrace {
@@ -184,13 +185,15 @@ void SceneState::build_level_0(FrameReport& report) {
   report.times.build_s += building.seconds();
 }
 
-void SceneState::choose_proxies(const PrimaryCamera& view, double pixels, FrameReport& report) {
+void SceneState::choose_proxies(const PrimaryCamera& view, const GBuffer& seen, double pixels, FrameReport& report) {
   if (scene_.file == nullptr) throw Error(ErrorKind::kUnsupported, "--proxy-beyond requires a .ptk file with proxies");
   if (!pose_.empty() || meshes_ || levels_)
     throw Error(ErrorKind::kUnsupported, "--proxy-beyond does not work with things that move or change by distance");
   build_level_0(report);
   const Stopwatch building;
-  std::vector<uint32_t> proxied = small_instances(*scene_.file, *scene_.source, view, pixels);
+  if (!proxy_choice_) proxy_choice_ = std::make_unique<ProxyChoice>(*scene_.file);
+  std::vector<uint32_t> proxied = proxy_choice_->small_instances(*scene_.source, view, pixels);
+  if (!proxy_choice_->pays(proxied, *scene_.source, seen)) proxied.clear();
   if (proxied != proxied_) {
     proxied_ = std::move(proxied);
     proxy_tracer_.reset(); // frees its memory first

@@ -15,6 +15,7 @@ class InstanceBoxes;
 class InstanceLevels;
 class MeshMotion;
 class PackedTracer;
+class ProxyChoice;
 struct MovedBox;
 
 /// What a FrameLoop traces. Everything referenced must outlive it.
@@ -53,8 +54,9 @@ public:
   void build_level_0(FrameReport& report);
 
   /// Chooses the instances that occlusion rays see as proxies, and makes their tracer if they changed.
+  /// @param seen, pixels as in ProxyChoice
   /// Throws Error(kUnsupported) without a file, or if something moves.
-  void choose_proxies(const PrimaryCamera& view, double pixels, FrameReport& report);
+  void choose_proxies(const PrimaryCamera& view, const GBuffer& seen, double pixels, FrameReport& report);
 
   /// Forgets the frame before.
   void reset();
@@ -91,15 +93,16 @@ private:
   std::unique_ptr<PackedSource> leveled_source_; ///< scene_.source if there are levels by distance
   std::unique_ptr<InstanceLevels> levels_;       ///< null if there are none
   std::unique_ptr<DetailPlanner> planner_;
-  std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced and nothing deforms
-  std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
-  std::unique_ptr<RayTracer> proxy_tracer_; ///< null if no instance is seen as its proxy
-  std::vector<uint32_t> proxied_;           ///< by proxy_tracer_
-  std::unique_ptr<MeshMotion> meshes_;      ///< null if no mesh deforms
-  std::unique_ptr<InstanceBoxes> boxes_;    ///< null if nothing moves
-  bool started_ = false;                    ///< there is a frame before
-  std::vector<Affine> pose_, last_pose_;    ///< by SceneMotion::moving_instances(): of this frame and the previous one
-  std::vector<Affine> last_world_;          ///< world_from_object of all instances in the previous frame
+  std::unique_ptr<RayTracer> level_0_;        ///< null if only levels are traced and nothing deforms
+  std::unique_ptr<RayTracer> level_tracer_;   ///< traces planner_->source()
+  std::unique_ptr<RayTracer> proxy_tracer_;   ///< null if no instance is seen as its proxy
+  std::unique_ptr<ProxyChoice> proxy_choice_; ///< null until one is needed
+  std::vector<uint32_t> proxied_;             ///< by proxy_tracer_
+  std::unique_ptr<MeshMotion> meshes_;        ///< null if no mesh deforms
+  std::unique_ptr<InstanceBoxes> boxes_;      ///< null if nothing moves
+  bool started_ = false;                      ///< there is a frame before
+  std::vector<Affine> pose_, last_pose_; ///< by SceneMotion::moving_instances(): of this frame and the previous one
+  std::vector<Affine> last_world_;       ///< world_from_object of all instances in the previous frame
 };
 
 } // namespace packtrace

@@ -5,20 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/trace/make_tracer.h"
 #include "runtime/voxels/other_instances.h"
 #include "runtime/voxels/voxel_scene.h"
 
 namespace packtrace {
-
-/// Instances that have a voxel proxy and are seen smaller than so many pixels: the diameter of the sphere around their
-/// box over the length of a pixel at its nearest point. Flat instances and those of the
-/// tree of world space are not among them. Ascending. Throws
-/// Error(kUnsupported) for a file without proxies.
-/// @param source of the file, as it is placed
-std::vector<uint32_t> small_instances(const BakedFile& file, const SceneSource& source, const PrimaryCamera& view,
-                                      double pixels);
 
 /// Traces some instances of a file as voxels, and the others as another tracer does. For occlusion rays: hits of voxels
 /// have a distance, but no surface to resolve().
@@ -29,7 +20,7 @@ class ProxyTracer final : public RayTracer {
 public:
   /// @param whole tracer of all instances of `source` at LOD level 0, whose trees are shared as make_tracer_beside()
   /// does; needed during this call only
-  /// @param proxied instances, as small_instances() gives them; not empty
+  /// @param proxied instances, ascending; not empty
   /// @param source must outlive the tracer
   /// @param config of `whole`, without movers
   /// Throws like make_tracer().

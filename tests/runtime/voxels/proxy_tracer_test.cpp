@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "compress/format/file/baked_file.h"
-#include "pbrt_import/base/error.h"
 #include "runtime/trace/source/packed_source.h"
 #include "runtime/voxels/proxy_tracer.h"
 #include "tests/compress/test_scenes.h"
@@ -15,7 +14,7 @@ namespace packtrace {
 namespace {
 
 /// Balls of radius 1 in a row away from the eye.
-BakedFile row_of_balls(uint32_t count, bool proxies, bool trees = true) {
+BakedFile row_of_balls(uint32_t count, bool trees = true) {
   Scene scene;
   scene.materials.emplace_back();
   scene.meshes.push_back(test::sphere_mesh(30));
@@ -24,35 +23,13 @@ BakedFile row_of_balls(uint32_t count, bool proxies, bool trees = true) {
     scene.instances.push_back({0, Affine(test::translation(DVec3(i % 3, 0.0, 6.0 * (i + 1))))});
   BakeConfig config;
   config.trees = trees;
-  if (proxies) config.proxy.use = ProxyUse::kVoxels, config.proxy.voxels = 24;
+  config.proxy.use = ProxyUse::kVoxels, config.proxy.voxels = 24;
   return BakedFile::from_bytes(test::bake(scene, config).bytes);
-}
-
-/// Looks from the file's zero along z.
-PrimaryCamera camera_of(const BakedFile& file) {
-  Camera camera;
-  camera.world_from_camera = test::translation(-file.origin());
-  camera.fov_degrees = 60.0;
-  return {camera, ImageSize{100, 100}};
-}
-
-TEST(ProxyTracer, ThoseThatLookSmallAreChosenByTheirDistance) {
-  const BakedFile file = row_of_balls(40, true);
-  const PackedSource source(file);
-  const std::vector<uint32_t> small = small_instances(file, source, camera_of(file), 8.0);
-  ASSERT_GT(small.size(), 3u);
-  ASSERT_LT(small.size(), 37u);
-  EXPECT_TRUE(std::ranges::is_sorted(small));
-  EXPECT_EQ(small.back(), 39u);
-  EXPECT_EQ(small.size(), 40u - small.front()); // all behind the first
-  EXPECT_EQ(small_instances(file, source, camera_of(file), 1e6).size(), 40u);
-  const BakedFile without = row_of_balls(4, false);
-  EXPECT_THROW(small_instances(without, PackedSource(without), camera_of(without), 8.0), Error);
 }
 
 /// Every query equals the nearer of the triangles of large instances and the voxels of small ones.
 void compare(Backend backend, uint32_t first_small) {
-  const BakedFile file = row_of_balls(30, true);
+  const BakedFile file = row_of_balls(30);
   const PackedSource source(file);
   std::vector<uint32_t> small;
   for (uint32_t i = first_small; i < 30; ++i) small.push_back(i);
@@ -118,7 +95,7 @@ uint64_t bytes_of(const RayTracer& tracer, std::string_view name) {
 }
 
 TEST(ProxyTracer, InstancesSeenAsVoxelsTakeNoPlacements) {
-  const BakedFile file = row_of_balls(300, true);
+  const BakedFile file = row_of_balls(300);
   const PackedSource source(file);
   std::vector<uint32_t> small;
   for (uint32_t i = 20; i < 300; ++i) small.push_back(i);
@@ -130,7 +107,7 @@ TEST(ProxyTracer, InstancesSeenAsVoxelsTakeNoPlacements) {
 }
 
 TEST(ProxyTracer, TreesAndClustersAreThoseOfTheWholeTracer) {
-  const BakedFile file = row_of_balls(8, true, false);
+  const BakedFile file = row_of_balls(8, false);
   ASSERT_TRUE(file.sections().trees.empty()); // both tracers would have to build them
   const PackedSource source(file);
   TracerConfig config;
