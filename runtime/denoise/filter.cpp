@@ -103,7 +103,7 @@ private:
     for (int r = -kRadius; r <= kRadius; ++r) window[static_cast<size_t>(r + kRadius)] = moments(sums_, y + r);
     const History& h = input_->history;
     kernels_.variance(
-        width_, {h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, input_->guides.disparity.row(y) + x_},
+        width_, {h.mean.row(y) + x_, h.samples.row(y) + x_, input_->guides.disparity.row(y) + x_, h.square.row(y) + x_},
         window, terms_, estimate_.row(0), {value_.row(y), precision_.row(y), lone_.row(y)});
     fill(y);
     if (y >= first_written_ && y < last_written_)
@@ -138,8 +138,8 @@ private:
       for (auto& ring : sums_) std::fill_n(ring.row(y), width_, 0.0f);
       return;
     }
-    kernels_.moments(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, h.trend.row(y) + x_,
-                     moments(scratch_, 0));
+    kernels_.moments(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_,
+                     input_->trends.row(y) + x_, moments(scratch_, 0));
     for (size_t i = 0; i < kMoments; ++i) kernels_.sum_along_row(width_, scratch_[i].row(0), sums_[i].row(y));
   }
 

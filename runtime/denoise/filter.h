@@ -16,6 +16,7 @@ struct FilterInput {
   const Guides& guides;
   const PairGuides& pair_guides;
   const History& history;
+  const Plane<uint32_t>& trends; ///< trend.h
   bool moving;      ///< history was resampled, so that samples are not as well stratified as in a still view
   bool stratified;  ///< AoFrame::stratified
   uint32_t samples; ///< AoFrame::samples

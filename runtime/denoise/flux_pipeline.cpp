@@ -34,7 +34,7 @@ private:
     auto& g = self.now_.guides;
     auto& h = self.now_.history;
     work(g.disparity), work(g.normal_x), work(g.normal_y), work(g.normal_z), work(g.instance);
-    work(h.mean), work(h.square), work(h.fast), work(h.samples), work(h.trend);
+    work(h.mean), work(h.samples), work(h.square), work(h.fast), work(self.trends_);
   }
   bool load_guides(const GBuffer& gbuffer);
 
@@ -43,6 +43,7 @@ private:
   bool pair_guides_outdated_ = false; ///< they do not belong to the guides
   /// `before_` is used while a frame is added. Until the next one that moves it is the memory of pair_guides_.
   FrameHistory now_, before_;
+  Plane<uint32_t> trends_; ///< trend.h
   PairGuides pair_guides_;
   HistoryUpdate update_;
   AoFilter filter_;
@@ -54,6 +55,7 @@ private:
 
 void FluxPipeline::resize(ImageSize size) {
   for (FrameHistory* frame : {&now_, &before_}) frame->guides.resize(size), frame->history.resize(size);
+  trends_.resize(size);
   result_.size = size;
   result_.ao.assign(size.pixels(), kInvalidAo);
   result_.variance.assign(size.pixels(), 0.0f);
@@ -88,22 +90,22 @@ void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistoryS
   const uint32_t longest = same_pixels ? std::numeric_limits<uint32_t>::max() : config_.max_tspp;
   update_.run(
       {now_.guides, ao.ao, ao.max_history, resample ? &motion : nullptr, !same_pixels, static_cast<float>(longest)},
-      now_.history);
+      now_.history, trends_);
 }
 
 const DenoisedAo& FluxPipeline::denoise(bool) {
   if (!has_frame_) return result_;
   if (pair_guides_outdated_)
     pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()),
-                         {before_.guides.disparity, before_.guides.instance, before_.history.trend});
+                         {before_.guides.disparity, before_.guides.instance, before_.history.mean});
   pair_guides_outdated_ = false;
-  filter_.run({now_.guides, pair_guides_, now_.history, moving_, stratified_, samples_},
+  filter_.run({now_.guides, pair_guides_, now_.history, trends_, moving_, stratified_, samples_},
               {result_.ao, result_.variance, result_.tspp});
   return result_;
 }
 
 size_t FluxPipeline::state_bytes() const {
-  size_t bytes = 0;
+  size_t bytes = trends_.bytes();
   for (const FrameHistory* frame : {&now_, &before_}) bytes += frame->guides.bytes() + frame->history.bytes();
   return bytes;
 }

@@ -34,31 +34,31 @@ class HistoryStrip {
 public:
   HistoryStrip(ImageSize size, const HistoryKernels& kernels, const FluxConfig& config)
       : kernels_(kernels), width_(static_cast<int>(size.width)), reprojection_(size, config, kernels),
-        statistics_(size.width, config.window, kernels), samples_(size, 1), discarded_(4 * size_t{size.width}),
-        limited_(size.width) {
+        statistics_(size.width, config.window, kernels), samples_(size, 1), discarded_(2 * size_t{size.width}),
+        discarded_moments_(2 * size_t{size.width}), past_moments_(2 * size_t{size.width}), limited_(size.width) {
     terms_ = correct_terms(config);
   }
 
   /// The samples of row y, without changing the history.
-  void look(const HistoryInput& input, const History& history, int y, const SampleRow& samples) {
+  void look(const HistoryInput& input, History& history, int y, const SampleRow& samples) {
     float* row = discarded_.data();
-    accumulate(input, history, y, {row, row + width_, row + 2 * width_, row + 3 * width_}, samples);
+    uint16_t* moments = discarded_moments_.data();
+    accumulate(input, history, y, {row, row + width_, moments, moments + width_}, samples);
   }
 
   /// Adds row y's samples to the history.
-  void add(const HistoryInput& input, History& history, int y) {
+  void add(const HistoryInput& input, History& history, uint32_t* trends, int y) {
     accumulate(input, history, y, row_of(history, y), samples_.row(0));
     if (input.motion != nullptr)
       kernels_.keep_trends(width_, &input.motion->motion_px[static_cast<size_t>(y) * static_cast<size_t>(width_)].x,
-                           history.samples.row(y), reprojection_.weights(), input.motion->previous.history.trend.row(y),
-                           history.trend.row(y));
-    update_trends(samples_.row(0).valid, history.mean.row(y), history.samples.row(y), input.longest,
-                  history.trend.row(y));
+                           history.samples.row(y), reprojection_.weights(), trends);
+    update_trends(samples_.row(0).valid, history.mean.row(y), history.samples.row(y), input.longest, trends);
   }
 
   /// Updates rows [first, last). @param neighbour returns the samples of rows of other strips
   template <typename Neighbour>
-  void update(const HistoryInput& input, History& history, int first, int last, const Neighbour& neighbour) {
+  void update(const HistoryInput& input, History& history, Plane<uint32_t>& trends, int first, int last,
+              const Neighbour& neighbour) {
     const int radius = statistics_.radius(), height = static_cast<int>(input.guides.size.height);
     for (int y = first - radius; y < last + radius; ++y) {
       if (y < 0 || y >= height) {
@@ -66,26 +66,28 @@ public:
       } else if (y < first || y >= last) {
         statistics_.add(neighbour(y));
       } else {
-        add(input, history, y);
+        add(input, history, trends.row(y), y);
         statistics_.add(samples_.row(0));
       }
       if (y - radius >= first)
-        kernels_.correct(width_, statistics_.finish(), terms_, row_of(history, y - radius),
-                         history.trend.row(y - radius));
+        kernels_.correct(width_, statistics_.finish(), terms_, row_of(history, y - radius), trends.row(y - radius));
     }
   }
 
 private:
   static HistoryRow row_of(History& h, int y) {
-    return {h.mean.row(y), h.square.row(y), h.fast.row(y), h.samples.row(y)};
+    return {h.mean.row(y), h.samples.row(y), h.square.row(y), h.fast.row(y)};
   }
 
-  void accumulate(const HistoryInput& input, const History& history, int y, const HistoryRow& out,
-                  const SampleRow& samples) {
-    const HistoryRow old = input.motion != nullptr ? reprojection_.at(*input.motion, y) : HistoryRow{};
-    PastRow past = input.motion != nullptr ? PastRow{old.mean, old.square, old.fast, old.samples}
-                                           : PastRow{history.mean.row(y), history.square.row(y), history.fast.row(y),
-                                                     history.samples.row(y)};
+  /// Row y of the history, in its pixels.
+  PastRow unmoved(History& h, int y) {
+    float *square = past_moments_.data(), *fast = square + width_;
+    kernels_.unpack(width_, h.square.row(y), square), kernels_.unpack(width_, h.fast.row(y), fast);
+    return {h.mean.row(y), square, fast, h.samples.row(y)};
+  }
+
+  void accumulate(const HistoryInput& input, History& history, int y, const HistoryRow& out, const SampleRow& samples) {
+    PastRow past = input.motion != nullptr ? reprojection_.at(*input.motion, y) : unmoved(history, y);
     if (!input.max_history.empty()) {
       limit_row(limited_.size(), &input.max_history[static_cast<size_t>(y) * limited_.size()], past.samples,
                 limited_.data());
@@ -109,7 +111,9 @@ private:
   LocalStatisticsRows statistics_;
   CorrectTerms terms_;
   SampleRows samples_;
-  std::vector<float> discarded_, limited_;
+  std::vector<float> discarded_;
+  std::vector<uint16_t> discarded_moments_;
+  std::vector<float> past_moments_, limited_;
 };
 
 /// Rows of strip i begin here.
@@ -135,7 +139,7 @@ HistoryUpdate::HistoryUpdate(const FluxConfig& config, Isa isa)
     : state_(new State{config, history_kernels(isa), {}, {}, {}}) {}
 HistoryUpdate::~HistoryUpdate() = default;
 
-void HistoryUpdate::run(const HistoryInput& input, History& history) {
+void HistoryUpdate::run(const HistoryInput& input, History& history, Plane<uint32_t>& trends) {
   State& s = *state_;
   constexpr int kRowsPerStrip = 96;
   const int height = static_cast<int>(input.guides.size.height), strips = std::max(1, height / kRowsPerStrip);
@@ -158,7 +162,7 @@ void HistoryUpdate::run(const HistoryInput& input, History& history) {
   };
   if (!input.correct) {
     for_each(0, strips, [&](int i) {
-      for (int y = begin_of(i); y < begin_of(i + 1); ++y) s.strip().add(input, history, y);
+      for (int y = begin_of(i); y < begin_of(i + 1); ++y) s.strip().add(input, history, trends.row(y), y);
     });
     return;
   }
@@ -166,7 +170,7 @@ void HistoryUpdate::run(const HistoryInput& input, History& history) {
     for (int y = begin_of(i) - radius; y < begin_of(i) + radius; ++y) s.strip().look(input, history, y, seam_row(i, y));
   });
   for_each(0, strips, [&](int i) {
-    s.strip().update(input, history, begin_of(i), begin_of(i + 1),
+    s.strip().update(input, history, trends, begin_of(i), begin_of(i + 1),
                      [&](int y) { return seam_row(y < begin_of(i) ? i : i + 1, y); });
   });
 }

@@ -39,7 +39,8 @@ public:
   HistoryUpdate(const FluxConfig& config, Isa isa);
   ~HistoryUpdate();
 
-  void run(const HistoryInput& input, History& history);
+  /// @param trends how fast the means of stratified samples converge: trend.h
+  void run(const HistoryInput& input, History& history, Plane<uint32_t>& trends);
 
 private:
   struct State;

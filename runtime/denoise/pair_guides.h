@@ -17,7 +17,8 @@ public:
   /// Memory of three planes of 4 bytes a pixel, whose pixels, but not their borders, are overwritten.
   struct Memory {
     Plane<float>& first;
-    Plane<uint32_t>&second, &third;
+    Plane<uint32_t>& second;
+    Plane<float>& third;
   };
 
   /// @param memory of the size of the guides; it must last as long as the weights

@@ -43,7 +43,7 @@ ReprojectionRows::ReprojectionRows(ImageSize size, const FluxConfig& config, con
   weights_ = row();
 }
 
-HistoryRow ReprojectionRows::at(const MotionFrame& frame, int y) {
+PastRow ReprojectionRows::at(const MotionFrame& frame, int y) {
   const Guides &now = frame.guides, &then = frame.previous.guides;
   const History& history = frame.previous.history;
   const size_t begin = static_cast<size_t>(y) * static_cast<size_t>(width_);
@@ -70,9 +70,9 @@ HistoryRow ReprojectionRows::at(const MotionFrame& frame, int y) {
       offset = offset_[static_cast<size_t>(end)];
     }
     const ptrdiff_t at = offset == kNoOffset ? 0 : ptrdiff_t{offset} + x;
-    const PreviousPixels from{then.disparity.row(y) + at, then.normal_x.row(y) + at, then.normal_y.row(y) + at,
-                              then.normal_z.row(y) + at,  then.instance.row(y) + at, history.mean.row(y) + at,
-                              history.square.row(y) + at, history.fast.row(y) + at,  history.samples.row(y) + at,
+    const PreviousPixels from{then.disparity.row(y) + at,  then.normal_x.row(y) + at,  then.normal_y.row(y) + at,
+                              then.normal_z.row(y) + at,   then.instance.row(y) + at,  history.mean.row(y) + at,
+                              history.samples.row(y) + at, history.square.row(y) + at, history.fast.row(y) + at,
                               history.mean.stride()};
     const LocatedRow& l = located_;
     const WantedRow wanted{
@@ -110,13 +110,13 @@ void ReprojectionRows::look_nearby(const MotionFrame& frame, int y) {
         const float count = h.samples.row(y)[at];
         if (!(near > 0.0f) || !(count > 0.0f)) continue;
         const float part = near * near * agreement(then, y, at, lost, config_);
-        weight += part, mean += part * h.mean.row(y)[at], square += part * h.square.row(y)[at];
-        fast += part * h.fast.row(y)[at], samples += part * count;
+        weight += part, mean += part * h.mean.row(y)[at], samples += part * count;
+        square += part * static_cast<float>(h.square.row(y)[at]), fast += part * static_cast<float>(h.fast.row(y)[at]);
       }
     if (!(weight > kMinHistoryWeight)) continue;
     const float scale = 1.0f / weight;
     result_.mean[x] = std::min(mean * scale, 1.0f);
-    result_.square[x] = square * scale, result_.fast[x] = fast * scale;
+    result_.square[x] = square * scale * (1.0f / kMomentUnits), result_.fast[x] = fast * scale * (1.0f / kMomentUnits);
     result_.samples[x] = config_.reprojection_nearby * std::min(samples * scale, longest_moving(config_));
   }
 }

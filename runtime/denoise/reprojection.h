@@ -44,7 +44,7 @@ public:
   ReprojectionRows(ImageSize size, const FluxConfig& config, const HistoryKernels& kernels);
 
   /// Returns row y of the history, 0 where it is rejected, valid until the next call.
-  HistoryRow at(const MotionFrame& frame, int y);
+  PastRow at(const MotionFrame& frame, int y);
   /// The sums of the weights of the last row's footprints.
   const float* weights() const { return weights_; }
 
@@ -57,7 +57,7 @@ private:
   std::vector<int32_t> offset_;
   std::vector<float> rows_; // of the located and of the resampled pixels
   LocatedRow located_;
-  HistoryRow result_;
+  PastRow result_;
   float* weights_; // of rows_, as are those before
 };
 

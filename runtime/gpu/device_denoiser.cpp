@@ -16,19 +16,19 @@ namespace {
 
 /// What a frame leaves to the next one.
 struct Past {
-  Buffer guides, history, trend;
+  Buffer guides, history, rest; ///< rest: moments and trends
 };
 // Per pixel.
-constexpr uint32_t kGuideBytes = 16, kHistoryBytes = 16, kTrendBytes = 4, kSampleBytes = 8, kPairBytes = 12,
+constexpr uint32_t kGuideBytes = 16, kHistoryBytes = 8, kRestBytes = 8, kSampleBytes = 8, kPairBytes = 12,
                    kNoisyBytes = 4, kResultBytes = 4;
 
 /// Begins saved histories, and changes with the layout of what follows.
 constexpr std::array<std::byte, 8> kSavedLayout = {std::byte{'g'}, std::byte{'p'}, std::byte{'u'}, std::byte{'d'},
-                                                   std::byte{'n'}, std::byte{'0'}, std::byte{'0'}, std::byte{'1'}};
+                                                   std::byte{'n'}, std::byte{'0'}, std::byte{'0'}, std::byte{'2'}};
 
 /// Bytes per pixel that the history's kernel reads and writes.
 uint32_t history_bytes(uint32_t flags) {
-  uint32_t bytes = 4 + 2 * (kHistoryBytes + kTrendBytes) + kSampleBytes; // with the samples
+  uint32_t bytes = 4 + 2 * (kHistoryBytes + kRestBytes) + kSampleBytes; // with the samples
   if ((flags & kHasLimits) != 0) bytes += 4;
   if ((flags & kKeepGuides) != 0) return bytes + kGuideBytes;
   bytes += 20 + kGuideBytes; // depth, normal and instance become a guide
@@ -152,7 +152,7 @@ void DeviceDenoiser::State::allocate(uint32_t new_width, uint32_t new_height) {
   };
   for (Past& past : past) {
     on_device(past.guides, kGuideBytes * n, "guides"), on_device(past.history, kHistoryBytes * n, "the history");
-    on_device(past.trend, kTrendBytes * n, "trends");
+    on_device(past.rest, kRestBytes * n, "moments and trends");
   }
   on_device(samples, kSampleBytes * n, "changes of samples"), on_device(pair_guides, kPairBytes * n, "guide weights");
   on_device(changes, 8, "flags");
@@ -216,11 +216,10 @@ std::vector<DenoiserDispatch> DeviceDenoiser::add(const DenoiseRecord& terms, co
   s.bind(*s.history,
          {&s.view_z.device(), &s.normal.device(), &s.instance.device(), &s.motion.device(), &s.previous_z.device(),
           &s.limits.device(), s.is_here(frame.ao_on_device) ? &frame.ao_on_device->values() : &s.ao.device(),
-          &s.changes, &before.guides, &now.guides, &before.history, &now.history, &before.trend, &now.trend,
-          &s.samples});
+          &s.changes, &before.guides, &now.guides, &before.history, &now.history, &before.rest, &now.rest, &s.samples});
   s.dispatch("history", *s.history, terms, kGroupHeight, history_bytes(terms.flags));
   if ((terms.flags & (kFollowMotion | kKeepGuides)) != 0) { // histories of jittered pixels are plain means
-    s.bind(*s.correct, {&s.samples, &now.history, &now.trend});
+    s.bind(*s.correct, {&s.samples, &now.history, &now.rest});
     s.dispatch("correct", *s.correct, terms, kTileHeight, kSampleBytes);
   }
   std::vector<DenoiserDispatch> times = s.run();
@@ -236,13 +235,13 @@ std::vector<DenoiserDispatch> DeviceDenoiser::filter(const DenoiseRecord& terms,
   s.dispatch("guides", *s.guides, terms, kTileHeight, kGuideBytes + kPairBytes);
   s.commands.fill(s.changes, 1, 1, 0);
   s.bind(*s.variance,
-         {&now.history, &now.trend, &now.guides, &s.pair_guides, &s.changes, &s.noisy[0], &s.result.device()});
+         {&now.history, &now.rest, &now.guides, &s.pair_guides, &s.changes, &s.noisy[0], &s.result.device()});
   s.dispatch("variance", *s.variance, terms, kGroupHeight,
-             kHistoryBytes + kTrendBytes + kNoisyBytes + kResultBytes +
+             kHistoryBytes + kRestBytes + kNoisyBytes + kResultBytes +
                  ((terms.flags & kFollowMotion) != 0 ? 0 : kGuideBytes));
   if (s.finish) {
     s.bind(*s.finish, {&s.noisy[0], &now.history, &s.result.device()});
-    s.dispatch("finish", *s.finish, terms, kGroupHeight, kNoisyBytes + kHistoryBytes / 2 + 2 * kResultBytes);
+    s.dispatch("finish", *s.finish, terms, kGroupHeight, kNoisyBytes + kHistoryBytes + 2 * kResultBytes);
   }
   for (size_t i = 0; i < s.filter_passes.size(); ++i) {
     Kernel& pass = *s.filter_passes[i];
@@ -251,7 +250,7 @@ std::vector<DenoiserDispatch> DeviceDenoiser::filter(const DenoiseRecord& terms,
     const bool last = i + 1 == s.filter_passes.size();
     if (last) of_pass.flags |= kLastPass;
     s.dispatch(kPassNames[i], pass, of_pass, kTileHeight,
-               kNoisyBytes + kPairBytes / 3 + (i == 0 || last ? kHistoryBytes / 2 : 0) +
+               kNoisyBytes + kPairBytes / 3 + (i == 0 || last ? kHistoryBytes : 0) +
                    (last ? 2 * kResultBytes : kNoisyBytes));
   }
   const std::span<float> planes[] = {result.ao, result.variance, result.tspp};
@@ -269,11 +268,11 @@ std::vector<std::byte> DeviceDenoiser::save() const {
   const State& s = *state_;
   const Past& now = s.past[s.now];
   const uint64_t n = s.pixels();
-  std::vector<std::byte> bytes(kSavedLayout.size() + (kGuideBytes + kHistoryBytes + kTrendBytes) * n);
+  std::vector<std::byte> bytes(kSavedLayout.size() + (kGuideBytes + kHistoryBytes + kRestBytes) * n);
   std::ranges::copy(kSavedLayout, bytes.begin());
   std::span<std::byte> rest = std::span(bytes).subspan(kSavedLayout.size());
   for (const auto& [buffer, size] :
-       {std::pair{&now.guides, kGuideBytes}, {&now.history, kHistoryBytes}, {&now.trend, kTrendBytes}}) {
+       {std::pair{&now.guides, kGuideBytes}, {&now.history, kHistoryBytes}, {&now.rest, kRestBytes}}) {
     download(s.device, *buffer, 0, rest.first(size * n));
     rest = rest.subspan(size * n);
   }
@@ -288,10 +287,10 @@ void DeviceDenoiser::restore(std::span<const std::byte> bytes) {
     throw Error(ErrorKind::kInput,
                 "denoiser: the saved history is of another backend or version of packtrace; render the frames again");
   bytes = bytes.subspan(kSavedLayout.size());
-  if (bytes.size() != (kGuideBytes + kHistoryBytes + kTrendBytes) * n)
+  if (bytes.size() != (kGuideBytes + kHistoryBytes + kRestBytes) * n)
     throw Error(ErrorKind::kInput, "denoiser: the saved history has another size");
   for (const auto& [buffer, size] :
-       {std::pair{&now.guides, kGuideBytes}, {&now.history, kHistoryBytes}, {&now.trend, kTrendBytes}}) {
+       {std::pair{&now.guides, kGuideBytes}, {&now.history, kHistoryBytes}, {&now.rest, kRestBytes}}) {
     update(s.device, *buffer, 0, bytes.first(size * n));
     bytes = bytes.subspan(size * n);
   }
@@ -299,7 +298,7 @@ void DeviceDenoiser::restore(std::span<const std::byte> bytes) {
 }
 
 uint64_t DeviceDenoiser::state_bytes() const {
-  return (2 * (kGuideBytes + kHistoryBytes + kTrendBytes) + kPairBytes) * state_->pixels();
+  return (2 * (kGuideBytes + kHistoryBytes + kRestBytes) + kPairBytes) * state_->pixels();
 }
 
 } // namespace packtrace::gpu

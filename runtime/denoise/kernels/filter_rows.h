@@ -106,7 +106,8 @@ using MomentWindow = std::array<MomentRows, kMomentWindow>;
 
 /// The history of a row, and where its camera rays hit something.
 struct HistoryOfRow {
-  const float *mean, *square, *samples, *disparity;
+  const float *mean, *samples, *disparity;
+  const uint16_t* square; ///< in units of 1 / kMomentUnits
 };
 
 /// Input of the first pass.
@@ -165,7 +166,7 @@ struct FilterKernels {
   using Exchange = void(int width, int step, const PassRows& rows, int16_t* value, uint16_t* precision);
   Exchange *exchange, *exchange_first;
   /// Moments of single pixels.
-  void (*moments)(int width, const float* mean, const float* square, const float* samples, const uint32_t* trend,
+  void (*moments)(int width, const float* mean, const uint16_t* square, const float* samples, const uint32_t* trend,
                   const MomentRows& out);
   /// Sums of kMomentWindow pixels along x.
   void (*sum_along_row)(int width, const float* in, float* out);

@@ -227,14 +227,14 @@ void exchange_row(int width, int step, const PassRows& rows, int16_t* value, uin
 /// MomentRows::counts; windows have fewer than 32 pixels.
 constexpr float kSecondCount = 32.0f, kThirdCount = 1024.0f;
 
-void moments_row(int width, const float* mean, const float* square, const float* samples, const uint32_t* trend,
+void moments_row(int width, const float* mean, const uint16_t* square, const float* samples, const uint32_t* trend,
                  const MomentRows& out) {
   const MomentRows o = out;
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float a = mean[x], n = samples[x];
     const float seen = n > 0.0f ? 1.0f : 0.0f, spread_seen = n >= 2.0f ? 1.0f : 0.0f;
-    const float spread = greater(square[x] - a * a, 0.0f) * n / greater(n - 1.0f, 1.0f);
+    const float spread = greater(moment_of(square[x]) - a * a, 0.0f) * n / greater(n - 1.0f, 1.0f);
     const float decay = __builtin_bit_cast(float, trend[x] & 0xffff0000u); // Trend::decay
     const float decay_seen = (n > 0.0f) & (decay > 0.0f) ? 1.0f : 0.0f;
     o.counts[x] = seen + kSecondCount * spread_seen + kThirdCount * decay_seen;
@@ -283,7 +283,7 @@ void variance_row(int width, const HistoryOfRow& history, const MomentWindow& wi
     const float count = greater(static_cast<float>(packed & 31), 1.0f);
     const float spread_seen = static_cast<float>((packed >> 5) & 31), decay_seen = static_cast<float>(packed >> 10);
     const float space = greater(squares * count - value * value, 0.0f) / (count * greater(count - 1.0f, 1.0f));
-    const float own = greater(h.square[x] - a * a, 0.0f) * n; // (n - 1) s2
+    const float own = greater(moment_of(h.square[x]) - a * a, 0.0f) * n; // (n - 1) s2
     // The mean of the variance around, with weight prior, and the pixel's own.
     const float around = spread_seen > 0.0f ? spreads : space, divisor = greater(spread_seen, 1.0f);
     float spread = (t.prior * around + own * divisor) / ((t.prior + n - 1.0f) * divisor);

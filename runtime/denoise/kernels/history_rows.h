@@ -55,7 +55,8 @@ struct PreviousPixels {
   const float* disparity;
   const int16_t *normal_x, *normal_y, *normal_z; ///< in kNormalUnit
   const uint32_t* instance;
-  const float *mean, *square, *fast, *samples;
+  const float *mean, *samples;
+  const uint16_t *square, *fast; ///< in units of 1 / kMomentUnits
   ptrdiff_t stride;
 };
 
@@ -68,12 +69,13 @@ struct WantedRow {
 
 /// One row of the history.
 struct HistoryRow {
-  float *mean, *square, *fast, *samples;
+  float *mean, *samples;
+  uint16_t *square, *fast; ///< in units of 1 / kMomentUnits
 };
 
-/// The same, to read.
+/// One row of the history before a frame is added to it.
 struct PastRow {
-  const float *mean, *square, *fast, *samples;
+  float *mean, *square, *fast, *samples;
 };
 
 /// Longest histories in frames.
@@ -119,17 +121,18 @@ struct HistoryKernels {
   /// @param from the previous frame at the first pixel plus its offset
   /// @param weights scratch
   std::array<void (*)(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
-                      const HistoryRow& out, float* weights),
+                      const PastRow& out, float* weights),
              kMaxNormalSquarings + 1>
       resample;
+  /// A row of moments from units of 1 / kMomentUnits.
+  void (*unpack)(int width, const uint16_t* moments, float* out);
   /// Adds samples to a row of the history, perhaps in place.
   void (*accumulate)(int width, const float* ao, const float* disparity, const HistoryLengths& longest,
                      const PastRow& past, const HistoryRow& history, const SampleRow& samples);
-  /// Trends of a resampled row: pixels that did not move keep theirs, unless their history was lost.
+  /// Trends of a resampled row, in place: pixels that did not move keep theirs, unless their history was lost.
   /// @param motion x and y of each pixel's motion in pixels
   /// @param weights of the footprints
-  void (*keep_trends)(int width, const float* motion, const float* samples, const float* weights,
-                      const uint32_t* before, uint32_t* trend);
+  void (*keep_trends)(int width, const float* motion, const float* samples, const float* weights, uint32_t* trend);
   /// Whether a pixel's sample made its history, shorter than `longest`, reach or cross a power of two.
   bool (*any_crosses)(int width, const float* valid, const float* samples, float longest);
   /// Sums along x, by the window's radius. Samples are read up to the radius outside the row.

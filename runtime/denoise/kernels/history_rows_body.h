@@ -77,10 +77,10 @@ inline int whole_runs(int width) { return (width + kRunPadding - 1) / kRunPaddin
 /// @param weights sum of the weights, 0 where the history is rejected
 template <int kSquarings>
 void interpolate_run(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
-                     const HistoryRow& out, float* __restrict weights) {
+                     const PastRow& out, float* __restrict weights) {
   const PreviousPixels p = from;
   const WantedRow w = wanted;
-  const HistoryRow o = out;
+  const PastRow o = out;
   const ptrdiff_t s = p.stride;
   const uint32_t ignored = test_instances ? 0u : ~0u; // bits in which instances may differ
   const int rounded = whole_runs(width);
@@ -104,8 +104,8 @@ void interpolate_run(int width, const PreviousPixels& from, const WantedRow& wan
       const float part = same ? bilinear * agreement : 0.0f;
       weight += part;
       mean += part * p.mean[at];
-      square += part * p.square[at];
-      fast += part * p.fast[at];
+      square += part * static_cast<float>(static_cast<int>(p.square[at]));
+      fast += part * static_cast<float>(static_cast<int>(p.fast[at]));
       samples += part * count;
     };
     corner(x, (1.0f - fx) * (1.0f - fy));
@@ -116,19 +116,19 @@ void interpolate_run(int width, const PreviousPixels& from, const WantedRow& wan
     const float scale = found ? 1.0f / weight : 0.0f;
     weights[x] = found ? weight : 0.0f;
     o.mean[x] = lesser(mean * scale, 1.0f);
-    o.square[x] = square * scale;
-    o.fast[x] = fast * scale;
+    o.square[x] = square * scale * (1.0f / kMomentUnits);
+    o.fast[x] = fast * scale * (1.0f / kMomentUnits);
     o.samples[x] = found ? lesser(samples, w.at.longest[x]) : 0.0f;
   }
 }
 
 /// Bicubic interpolation of the mean, where its footprint and the eight neighbours that share edges with it lie on one
 /// surface: a hard test without normals.
-void sharpen_run(int width, const PreviousPixels& from, const WantedRow& wanted, const HistoryRow& out,
+void sharpen_run(int width, const PreviousPixels& from, const WantedRow& wanted, const PastRow& out,
                  const float* __restrict weights) {
   const PreviousPixels p = from;
   const WantedRow w = wanted;
-  const HistoryRow o = out;
+  const PastRow o = out;
   const ptrdiff_t s = p.stride;
   const int rounded = whole_runs(width);
 #pragma GCC ivdep
@@ -158,11 +158,15 @@ void sharpen_run(int width, const PreviousPixels& from, const WantedRow& wanted,
 
 template <int kSquarings>
 void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
-                  const HistoryRow& out, float* weights) {
+                  const PastRow& out, float* weights) {
   interpolate_run<kSquarings>(width, from, wanted, test_instances, out, weights);
   float between = 0.0f;
   for (int x = 0; x < width; ++x) between = greater(between, wanted.at.fraction_x[x] + wanted.at.fraction_y[x]);
   if (between > 0.0f) sharpen_run(width, from, wanted, out, weights);
+}
+
+void unpack_row(int width, const uint16_t* moments, float* __restrict out) {
+  for (int x = 0; x < width; ++x) out[x] = moment_of(moments[x]);
 }
 
 void accumulate_row(int width, const float* ao, const float* disparity, const HistoryLengths& longest,
@@ -181,8 +185,8 @@ void accumulate_row(int width, const float* ao, const float* disparity, const Hi
     const float mean = p.mean[x] + (value - p.mean[x]) * share;
     const float fast = p.fast[x] + (value - p.fast[x]) * fast_share;
     h.mean[x] = mean;
-    h.square[x] = p.square[x] + (value * value - p.square[x]) * share;
-    h.fast[x] = fast;
+    h.square[x] = in_moment_units(p.square[x] + (value * value - p.square[x]) * share);
+    h.fast[x] = in_moment_units(fast);
     h.samples[x] = valid ? count : lesser(p.samples[x], most.slow);
     o.ao[x] = value;
     o.valid[x] = valid ? 1.0f : 0.0f;
@@ -190,11 +194,10 @@ void accumulate_row(int width, const float* ao, const float* disparity, const Hi
   }
 }
 
-void keep_trends_row(int width, const float* motion, const float* samples, const float* weights, const uint32_t* before,
-                     uint32_t* __restrict trend) {
+void keep_trends_row(int width, const float* motion, const float* samples, const float* weights, uint32_t* trend) {
   for (int x = 0; x < width; ++x) {
     const bool still = (std::abs(motion[2 * x]) <= kStillMotion) & (std::abs(motion[2 * x + 1]) <= kStillMotion);
-    const uint32_t kept = before[x];
+    const uint32_t kept = trend[x];
     trend[x] = still & (samples[x] > 1.0f) & (weights[x] > kLostWeight) ? kept : 0u;
   }
 }
@@ -278,9 +281,10 @@ void correct_row(int width, const LocalRow& local, const CorrectTerms& terms, co
     const float shift = new_mean - old_mean;
     const float kept = 1.0f - lesser(t.response * std::abs(shift), 1.0f);
     const float n = lesser(h.samples[x], greater(h.samples[x] * kept, t.fast_frames));
-    const float moment = greater(h.square[x] - old_mean * old_mean, 0.0f); // a shift keeps the variance
+    const uint16_t old_square = h.square[x];
+    const float spread = greater(moment_of(old_square) - old_mean * old_mean, 0.0f); // a shift keeps the variance
     h.mean[x] = new_mean;
-    h.square[x] = moment + new_mean * new_mean;
+    h.square[x] = shift == 0.0f ? old_square : in_moment_units(spread + new_mean * new_mean);
     h.samples[x] = n;
     trend[x] = shift == 0.0f ? trend[x] : 0u;
   }
@@ -290,6 +294,7 @@ template <int... kPowers>
 constexpr HistoryKernels history_table(std::integer_sequence<int, kPowers...>) {
   return {locate_row,
           {resample_run<kPowers>...},
+          unpack_row,
           accumulate_row,
           keep_trends_row,
           any_crosses,

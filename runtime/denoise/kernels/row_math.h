@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "runtime/denoise/kernels/units.h"
 
 /// What the kernels of all passes use. Local to each file, because every instruction set compiles them.
@@ -11,6 +13,13 @@ constexpr float kSquaredNormalUnit = kNormalUnit * kNormalUnit;
 /// Replacements for std::min and std::max, which take references and thereby keep GCC from vectorising loops.
 inline float lesser(float a, float b) { return b < a ? b : a; }
 inline float greater(float a, float b) { return a < b ? b : a; }
+
+/// From and to units of 1 / kMomentUnits. NaN becomes 0.
+inline float moment_of(uint16_t units) { return static_cast<float>(static_cast<int>(units)) * (1.0f / kMomentUnits); }
+inline uint16_t in_moment_units(float moment) {
+  const float bounded = lesser(greater(0.0f, moment), 1.0f);
+  return static_cast<uint16_t>(static_cast<int>(bounded * kMomentUnits + 0.5f));
+}
 
 } // namespace
 } // namespace packtrace

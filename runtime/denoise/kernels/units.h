@@ -6,6 +6,9 @@ namespace packtrace {
 /// quarter of a pixel.
 inline constexpr float kStillMotion = 1e-3f;
 
+/// Histories store moments, which are between 0 and 1, in units of 1 / kMomentUnits.
+inline constexpr float kMomentUnits = 65535.0f;
+
 /// Guides store components of normals in these units.
 inline constexpr float kNormalUnit = 1.0f / 16384.0f;
 

@@ -72,6 +72,7 @@ void write_denoiser_constants(std::ostream& out) {
   write(out, "kLastPass", kLastPass);
   write(out, "kStillMotion", kStillMotion);
   write(out, "kNormalUnit", kNormalUnit);
+  write(out, "kMomentUnits", kMomentUnits);
   write(out, "kMinHistoryWeight", kMinHistoryWeight);
   write(out, "kLostWeight", kLostWeight);
   write(out, "kNearbyRadius", uint32_t{kNearbyRadius});

@@ -41,6 +41,18 @@ uvec4 guide_of(float z, vec3 normal, uint instance) {
   ivec3 n = good ? ivec3(component(normal.x), component(normal.y), component(normal.z)) : ivec3(0);
   return uvec4(floatBitsToUint(disparity_of(z)), uint(n.x & 0xffff) | (uint(n.y) << 16), uint(n.z & 0xffff), instance);
 }
+
+// --- histories: mean and length; moments (mean square | fast mean << 16) and trend ---
+float moment_of(uint units) {
+  precise float moment = float(units) * (1.0 / kMomentUnits);
+  return moment;
+}
+// In units of 1 / kMomentUnits, of which the upper and the lower half of a word hold one each. NaN becomes 0.
+uint in_moment_units(float moment) {
+  precise float scaled = lesser(greater(0.0, moment), 1.0) * kMomentUnits + 0.5;
+  return uint(scaled);
+}
+
 bool is_still(vec2 motion) { return abs(motion.x) <= kStillMotion && abs(motion.y) <= kStillMotion; }
 
 // --- integers of 16 bits in words ---

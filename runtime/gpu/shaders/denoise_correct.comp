@@ -11,7 +11,7 @@ layout(local_size_x = 32, local_size_y = 16) in;
 const uint kThreads = 512u;
 layout(std430, binding = 0) readonly restrict buffer Samples { vec2 samples[]; };
 layout(std430, binding = 1) restrict buffer History { vec2 history[]; };
-layout(std430, binding = 2) writeonly restrict buffer Trend { uint trend[]; };
+layout(std430, binding = 2) restrict buffer Rest { uvec2 rest[]; }; // moments, trend
 
 const int kWide = 32, kHigh = 16, kBorder = 4; // pixels of a group; border
 shared vec2 s_sample[(kHigh + 2 * kBorder) * (kWide + 2 * kBorder)];
@@ -77,18 +77,18 @@ void correct(ivec2 p, uint at) {
   if (wanted == 0.0) return;
 
   uint i = index_of(p);
-  vec2 slow = history[i], rest = history[pixel_count() + i];
+  vec2 slow = history[i];
+  uint moments = rest[i].x;
   float old_mean = slow.x;
   precise float new_mean = slow.y > 0.0 ? lesser(greater(old_mean + wanted, 0.0), 1.0) : old_mean;
   precise float shift = new_mean - old_mean;
   if (shift == 0.0) return;
   precise float kept = 1.0 - lesser(terms.response * abs(shift), 1.0);
   precise float frames = lesser(slow.y, greater(slow.y * kept, terms.fast_frames));
-  precise float moment = greater(rest.x - old_mean * old_mean, 0.0); // a shift keeps the variance
+  precise float moment = greater(moment_of(moments & 0xffffu) - old_mean * old_mean, 0.0); // a shift keeps the variance
   precise float square = moment + new_mean * new_mean;
   history[i] = vec2(new_mean, frames);
-  history[pixel_count() + i] = vec2(square, rest.y);
-  trend[i] = 0u;
+  rest[i] = uvec2(in_moment_units(square) | (moments & 0xffff0000u), 0u);
 }
 
 void main() {

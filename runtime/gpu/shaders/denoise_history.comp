@@ -15,14 +15,14 @@ layout(std430, binding = 4) readonly restrict buffer PreviousDepths { float prev
 layout(std430, binding = 5) readonly restrict buffer Limits { float limits[]; };
 layout(std430, binding = 6) readonly restrict buffer Ao { float ao[]; };
 layout(std430, binding = 7) readonly restrict buffer Changes { uint changes[]; };
-// The same buffers before and now, unless kFollowMotion is set. Histories are two planes: mean and length; mean square
-// and fast mean.
+// The same buffers before and now, unless kFollowMotion is set. Histories are two buffers: mean and length; moments and
+// trend.
 layout(std430, binding = 8) readonly buffer GuidesBefore { uvec4 guides_before[]; };
 layout(std430, binding = 9) buffer GuidesNow { uvec4 guides_now[]; };
 layout(std430, binding = 10) readonly buffer HistoryBefore { vec2 history_before[]; };
 layout(std430, binding = 11) buffer HistoryNow { vec2 history_now[]; };
-layout(std430, binding = 12) readonly buffer TrendBefore { uint trend_before[]; };
-layout(std430, binding = 13) buffer TrendNow { uint trend_now[]; };
+layout(std430, binding = 12) readonly buffer RestBefore { uvec2 rest_before[]; };
+layout(std430, binding = 13) buffer RestNow { uvec2 rest_now[]; };
 layout(std430, binding = 14) writeonly restrict buffer Samples { vec2 samples[]; }; // value, or -1; change
 
 struct Past {
@@ -30,8 +30,9 @@ struct Past {
 };
 
 Past past_of(uint i) {
-  vec2 a = history_before[i], b = history_before[pixel_count() + i];
-  return Past(a.x, b.x, b.y, a.y);
+  vec2 a = history_before[i];
+  uint moments = rest_before[i].x;
+  return Past(a.x, moment_of(moments & 0xffffu), moment_of(moments >> 16), a.y);
 }
 
 float disparity_at(ivec2 p) { return inside(p) ? disparity_of(view_z[index_of(p)]) : 0.0; }
@@ -74,9 +75,10 @@ Located locate(ivec2 p, float now, vec2 motion, bool still) {
   return l;
 }
 
-// The 2 x 2 pixels, weighted by how well they match.
+// Pixels weighted by how well they match.
 struct Gathered {
-  float weight, mean, square, fast, frames;
+  float weight, mean, frames;
+  float square, fast; // in units of 1 / kMomentUnits
 };
 
 void gather(inout Gathered sum, ivec2 p, float bilinear, Located l, uvec4 guide, ivec3 normal) {
@@ -88,15 +90,16 @@ void gather(inout Gathered sum, ivec2 p, float bilinear, Located l, uvec4 guide,
   precise float cosine =
       lesser(greater(1.1 * kSquaredNormalUnit * float(dot_of(normal_of(other.y, other.z), normal)), 0.0), 1.0);
   for (uint s = 0u; s < kSquarings; ++s) cosine *= cosine;
-  Past past = past_of(i);
-  bool same = there > 0.0 && past.frames > 0.0 && away <= 2.0 * l.tolerance &&
+  vec2 past = history_before[i];
+  uint moments = rest_before[i].x;
+  bool same = there > 0.0 && past.y > 0.0 && away <= 2.0 * l.tolerance &&
               (!has(kTestInstances) || other.w == guide.w);
   if (!same) return;
   precise float part = bilinear * (quotient(l.tolerance, greater(away, l.tolerance)) * cosine);
   precise float weight = sum.weight + part;
-  precise float mean = sum.mean + part * past.mean, square = sum.square + part * past.square;
-  precise float fast = sum.fast + part * past.fast, frames = sum.frames + part * past.frames;
-  sum = Gathered(weight, mean, square, fast, frames);
+  precise float mean = sum.mean + part * past.x, frames = sum.frames + part * past.y;
+  precise float square = sum.square + part * float(moments & 0xffffu), fast = sum.fast + part * float(moments >> 16);
+  sum = Gathered(weight, mean, frames, square, fast);
 }
 
 // A pixel of the bicubic footprint; `same` becomes false if it is not on the surface.
@@ -152,7 +155,8 @@ bool nearby(Located l, uvec4 guide, ivec3 normal, out Past past) {
   past = Past(0.0, 0.0, 0.0, 0.0);
   if (!(sum.weight > kMinHistoryWeight)) return false;
   float scale = quotient(1.0, sum.weight);
-  precise float mean = lesser(sum.mean * scale, 1.0), square = sum.square * scale, fast = sum.fast * scale;
+  precise float mean = lesser(sum.mean * scale, 1.0);
+  precise float square = sum.square * scale * (1.0 / kMomentUnits), fast = sum.fast * scale * (1.0 / kMomentUnits);
   precise float frames = terms.nearby * lesser(sum.frames * scale, terms.longest_moving);
   past = Past(mean, square, fast, frames);
   return true;
@@ -178,7 +182,8 @@ Past resampled(ivec2 p, uvec4 guide, vec2 motion, bool still, out bool lost) {
   }
   if (!(sum.weight > kMinHistoryWeight)) return Past(0.0, 0.0, 0.0, 0.0);
   float scale = quotient(1.0, sum.weight);
-  precise float mean = sum.mean * scale, mean_square = sum.square * scale, fast = sum.fast * scale;
+  precise float mean = sum.mean * scale;
+  precise float mean_square = sum.square * scale * (1.0 / kMomentUnits), fast = sum.fast * scale * (1.0 / kMomentUnits);
   Past past = Past(lesser(mean, 1.0), mean_square, fast, lesser(sum.frames, l.longest));
   if (fx + fy > 0.0 && sum.weight > kMinSharpenWeight) {
     float sharp = sharpened(past.mean, l, guide.w);
@@ -219,7 +224,7 @@ void main() {
   Past past = Past(0.0, 0.0, 0.0, 0.0);
   uint trend = 0u;
   if (has(kHasHistory)) {
-    trend = trend_before[i];
+    trend = rest_before[i].y;
     if (moves) {
       vec2 motion = motions[i];
       still = is_still(motion);
@@ -243,8 +248,7 @@ void main() {
   if (moves) trend = still && frames > 1.0 && !lost ? trend : 0u;
   if (valid && frames < terms.longest && crosses_power_of_two(frames)) trend = next_trend(trend, mean, frames);
   history_now[i] = vec2(mean, frames);
-  history_now[pixel_count() + i] = vec2(square, fast);
-  trend_now[i] = trend;
+  rest_now[i] = uvec2(in_moment_units(square) | (in_moment_units(fast) << 16), trend);
   precise float change = fast - mean;
   samples[i] = vec2(valid ? value : -1.0, valid ? change : 0.0);
 }

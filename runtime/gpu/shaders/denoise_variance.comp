@@ -6,7 +6,7 @@
 
 layout(local_size_x = 32, local_size_y = 8) in;
 layout(std430, binding = 0) readonly restrict buffer History { vec2 history[]; };
-layout(std430, binding = 1) readonly restrict buffer Trend { uint trend[]; };
+layout(std430, binding = 1) readonly restrict buffer Rest { uvec2 rest[]; }; // moments, trend
 layout(std430, binding = 2) readonly restrict buffer Guides { uvec4 guides[]; };
 layout(std430, binding = 3) readonly restrict buffer PairGuides { uint pair_guides[]; };
 layout(std430, binding = 4) readonly restrict buffer Changes { uint changes[]; };
@@ -30,9 +30,9 @@ void load_moments(ivec2 origin) {
     float a = slow.x, n = slow.y;
     if (!(n > 0.0)) continue;
     precise float square = a * a;
-    precise float scaled = greater(history[pixel_count() + at].x - square, 0.0) * n;
+    precise float scaled = greater(moment_of(rest[at].x & 0xffffu) - square, 0.0) * n;
     float spread = quotient(scaled, greater(n - 1.0, 1.0));
-    float decay = uintBitsToFloat(trend[at] & 0xffff0000u);
+    float decay = uintBitsToFloat(rest[at].y & 0xffff0000u);
     s_counts[i] = 1u + (n >= 2.0 ? 1u << 8 : 0u) + (decay > 0.0 ? 1u << 16 : 0u);
     s_moments[i] = vec4(a, square, n >= 2.0 ? spread : 0.0, decay > 0.0 ? decay : 0.0);
   }
@@ -141,7 +141,7 @@ void main() {
   for (int r = 0; r < 5; ++r) counts += s_row_counts[at + r * kWide], sums += s_rows[at + r * kWide];
   vec2 slow = history[i];
   bool moves = has(kHasHistory) && has(kFollowMotion) && changes[0] != 0u;
-  Variance v = variance_of(slow, history[pixel_count() + i].x, counts, sums, moves);
+  Variance v = variance_of(slow, moment_of(rest[i].x & 0xffffu), counts, sums, moves);
   precise float allowed = 2.0 * terms.noise_tolerance * v.told + 1e-6;
   float root = reciprocal_root(allowed);
   precise float precision_units = lesser(greater(kPrecisionUnits * root + 0.5, 1.0), kMostPrecision);

@@ -25,20 +25,22 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
   for (int y = 0; y < 21; ++y)
     for (int x = 0; x < 33; ++x) {
       const auto random = [&](uint32_t c) { return uniform(static_cast<uint32_t>(x), static_cast<uint32_t>(y), c); };
-      previous.history.mean.row(y)[x] = random(0), previous.history.square.row(y)[x] = random(1);
-      previous.history.fast.row(y)[x] = random(2), previous.history.samples.row(y)[x] = 7.0f;
+      const auto moment = [&](uint32_t c) { return static_cast<uint16_t>(random(c) * kMomentUnits); };
+      previous.history.mean.row(y)[x] = random(0), previous.history.square.row(y)[x] = moment(1);
+      previous.history.fast.row(y)[x] = moment(2), previous.history.samples.row(y)[x] = 7.0f;
     }
   for (Vec2& motion : g.motion_px) motion = Vec2(3, -2);
   const FluxConfig config;
   ReprojectionRows rows(size, config, history_kernels(chosen_isa()));
   for (int y = 0; y < 21; ++y) { // the rows are the same memory, so a rejection must overwrite an earlier row's values
-    const HistoryRow out = rows.at({previous, previous.guides, g.motion_px, {}}, y);
+    const PastRow out = rows.at({previous, previous.guides, g.motion_px, {}}, y);
     for (int x = 0; x < 33; ++x) {
       const bool seen = x >= 3 && y + 2 < 21;
       ASSERT_EQ(out.samples[x], seen ? 7.0f : 0.0f);
       ASSERT_EQ(out.mean[x], seen ? previous.history.mean.row(y + 2)[x - 3] : 0.0f);
-      ASSERT_EQ(out.square[x], seen ? previous.history.square.row(y + 2)[x - 3] : 0.0f);
-      ASSERT_EQ(out.fast[x], seen ? previous.history.fast.row(y + 2)[x - 3] : 0.0f);
+      // Moments have whole units, so that rounding finds the same ones again.
+      ASSERT_EQ(std::lround(out.square[x] * kMomentUnits), seen ? previous.history.square.row(y + 2)[x - 3] : 0);
+      ASSERT_EQ(std::lround(out.fast[x] * kMomentUnits), seen ? previous.history.fast.row(y + 2)[x - 3] : 0);
     }
   }
 }
