@@ -37,13 +37,18 @@ function(packtrace_product_headers name first)
   endforeach()
 endfunction()
 
-# One set for each set of options. Libraries of a few batches are not worth it.
+# One set for each set of options.
 set(option_properties COMPILE_OPTIONS POSITION_INDEPENDENT_CODE CXX_VISIBILITY_PRESET VISIBILITY_INLINES_HIDDEN)
 if(PACKTRACE_SANITIZE)
   list(APPEND option_properties PACKTRACE_CHECK_ALIGNMENT)
 endif()
 set(groups)
-foreach(library packtrace_scene packtrace_import packtrace_format packtrace_bake packtrace_vertex16)
+foreach(library packtrace_scene packtrace_import packtrace_format packtrace_bake packtrace_vertex16 packtrace_exchange
+    packtrace_image packtrace_camera packtrace_trace packtrace_lod packtrace_ao packtrace_denoise packtrace_shade packtrace_voxels
+    packtrace_gpu packtrace_motion packtrace_layered packtrace_frame packtrace_measured_errors packtrace_scenes)
+  if(NOT TARGET ${library}) # left out of this build
+    continue()
+  endif()
   set(group group)
   foreach(property ${option_properties})
     get_target_property(value ${library} ${property})
