@@ -82,16 +82,27 @@ trace(const OccupancyStream& stream, glm::vec<3, Real> origin, glm::vec<3, Real>
   }
 }
 
-} // namespace
-
-PACKTRACE_AVX2_CLONES std::optional<VoxelHit<double>> VoxelTracer::first_hit(glm::dvec3 origin, glm::dvec3 direction,
-                                                                             double t_min, double t_max) const {
-  return trace<double>(*stream_, origin, direction, t_min, t_max);
+// Clang refuses members in several versions that a source of the same batch has called before.
+PACKTRACE_AVX2_CLONES std::optional<VoxelHit<double>> trace_double(const OccupancyStream& stream, glm::dvec3 origin,
+                                                                   glm::dvec3 direction, double t_min, double t_max) {
+  return trace<double>(stream, origin, direction, t_min, t_max);
 }
 
-PACKTRACE_AVX2_CLONES std::optional<VoxelHit<float>> VoxelTracer::first_hit(glm::vec3 origin, glm::vec3 direction,
-                                                                            float t_min, float t_max) const {
-  return trace<float>(*stream_, origin, direction, t_min, t_max);
+PACKTRACE_AVX2_CLONES std::optional<VoxelHit<float>> trace_float(const OccupancyStream& stream, glm::vec3 origin,
+                                                                 glm::vec3 direction, float t_min, float t_max) {
+  return trace<float>(stream, origin, direction, t_min, t_max);
+}
+
+} // namespace
+
+std::optional<VoxelHit<double>> VoxelTracer::first_hit(glm::dvec3 origin, glm::dvec3 direction, double t_min,
+                                                       double t_max) const {
+  return trace_double(*stream_, origin, direction, t_min, t_max);
+}
+
+std::optional<VoxelHit<float>> VoxelTracer::first_hit(glm::vec3 origin, glm::vec3 direction, float t_min,
+                                                      float t_max) const {
+  return trace_float(*stream_, origin, direction, t_min, t_max);
 }
 
 bool VoxelTracer::occluded(glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) const {
