@@ -107,8 +107,8 @@ void morph(Document& document, const Value& primitive, std::span<const double> w
   }
 }
 
-/// What the frames of a primitive are made from.
-/// @param mesh before it is deformed
+/// Collects what the frames of a primitive are evaluated from.
+/// @param mesh not deformed yet
 PosedFrames::Source frame_source(Document& document, const Value& mesh_value, const Value& primitive,
                                  const PoseFrames& poses, const PrimitiveMesh& mesh) {
   PosedFrames::Source source;
@@ -116,14 +116,16 @@ PosedFrames::Source frame_source(Document& document, const Value& mesh_value, co
   source.mesh_weights = morph_weights(mesh_value, primitive, {});
   const std::optional<Value> targets = primitive.find("targets");
   source.targets.resize(targets ? targets->size() : 0);
-  for (const std::vector<double>& weights : poses.weights)
-    for (size_t i = 0; i < morph_weights(mesh_value, primitive, weights).size(); ++i)
-      if ((weights.empty() ? source.mesh_weights : weights)[i] != 0.0 && source.targets[i].empty())
+  for (const std::vector<double>& of_frame : poses.weights) {
+    const std::vector<double> weights = morph_weights(mesh_value, primitive, of_frame);
+    for (size_t i = 0; i < weights.size(); ++i)
+      if (weights[i] != 0.0 && source.targets[i].empty())
         source.targets[i] = read_target(document, primitive, i, "POSITION", mesh);
+  }
   return source;
 }
 
-/// Which vertices the importer keeps: those of triangles with three corners at finite places.
+/// Marks the vertices that the importer keeps: those of triangles with three different, finite corners.
 std::vector<uint8_t> used_vertices(const PrimitiveMesh& mesh, const std::vector<int32_t>& indices) {
   std::vector<uint8_t> used(static_cast<size_t>(mesh.vertices), 0);
   const auto finite = [&](int32_t v) {

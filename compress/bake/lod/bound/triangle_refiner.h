@@ -62,7 +62,7 @@ private:
   static constexpr double kLeak = 8.0;
   static constexpr size_t kMaxSubtracted = 48; // triangles
   static constexpr double kGoodEnough = 1.1;   // stops within this factor of the lower bound
-  static constexpr double kRounding = 1e-6;    // steps; error of differences of distances
+  static constexpr double kRounding = 1e-6;    // rounding error of differences of distances, in grid steps
 
   /// One subdivision level: the corners of a part and the midpoints of its sides, with their distances.
   struct Level {
@@ -154,16 +154,21 @@ private:
     return reach;
   }
 
-  /// Sets near_ to the triangles of the level that may have points of the part at an accepted distance.
+  /// Lower bound of the distance of any point of a part from triangle i of the level.
+  static double least_distance(const Level& level, const std::array<size_t, 3>& corners,
+                               const std::array<double, 3>& reach, uint32_t i) {
+    return std::max({level.distances[corners[0]][i] - reach[0], level.distances[corners[1]][i] - reach[1],
+                     level.distances[corners[2]][i] - reach[2]});
+  }
+
+  /// Sets near_ to the triangles of the level that can be at an accepted distance from a point of the part.
   template <typename Accept>
   void find_near(const Level& level, const std::array<size_t, 3>& corners, const std::array<DVec3, 3>& part,
                  const Accept& accept) {
     const std::array<double, 3> reach = reaches(part);
     near_.clear();
     for (uint32_t i = 0; i < level.among->size(); ++i) {
-      const double least =
-          std::max({level.distances[corners[0]][i] - reach[0], level.distances[corners[1]][i] - reach[1],
-                    level.distances[corners[2]][i] - reach[2]});
+      const double least = least_distance(level, corners, reach, i);
       if (accept(least - kRounding, level.among->number(i))) near_.push_back(i);
     }
   }
@@ -179,8 +184,7 @@ private:
     const std::array<double, 3> reach = reaches({to.points[0], to.points[1], to.points[2]});
     near_.clear();
     for (uint32_t i = 0; i < from.among->size(); ++i) {
-      const double least =
-          std::max({to.distances[0][i] - reach[0], to.distances[1][i] - reach[1], to.distances[2][i] - reach[2]});
+      const double least = least_distance(from, corners, reach, i);
       if (i == where || least <= good || enough(least, from.among->number(i))) near_.push_back(i);
     }
     work_ += from.among->size();
