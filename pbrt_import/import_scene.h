@@ -37,9 +37,8 @@ struct ImportOptions {
   std::optional<uint32_t> world;
   std::optional<double> time; ///< time at which animations are evaluated; unset: shutter opening of the camera
   double mesh_scale = 1.0;    ///< factor of the coordinates of mesh files, within [1e-30, 1e30]
-  /// Keeps the frames of meshes of glTF files that morph targets or skins deform (ImportResult::sequences), at about
-  /// this rate, which is finite and positive. Such meshes then stand as at 0 s, since the animation repeats; unset: as
-  /// at `time`.
+  /// If set, keeps the frames of the glTF meshes that morph targets or skins deform (ImportResult::sequences), at about
+  /// this rate, which is finite and positive. These meshes have their shape at 0 s then, and that at `time` otherwise.
   std::optional<double> frames_per_second;
   std::optional<std::string> animation; ///< of glTF files: name or number of the one that moves nodes; unset: the first
   bool allow_uris_outside_folder = false; ///< glTF files may name files outside their folder
@@ -73,9 +72,9 @@ struct ImportResult {
   Scene scene;
   ImportStatistics statistics;
   std::vector<std::filesystem::path> files; ///< all files that the scene names, read or not, in no particular order
-  /// Frames of the meshes that the animation of a glTF file deforms, if ImportOptions::frames_per_second is set; by
-  /// ascending mesh. A file has as many frames as its animation's span has at that rate, rounded, and at least two.
-  /// Their rate is frames / span, so that they repeat with the tracks of nodes; frame k shows the time k / rate.
+  /// Frames of the meshes that the animation of a glTF file deforms, if ImportOptions::frames_per_second is set; sorted
+  /// by mesh. A file has round(span of its animation * frames_per_second) frames, but at least two. Their rate is count
+  /// / span, so they repeat together with the tracks of nodes; frame k is at k / rate seconds.
   std::vector<MeshSequence> sequences;
   MemoryReservation memory; ///< reservation for the scene; must live as long as the scene
 };

@@ -19,7 +19,7 @@ ReplacedFile::ReplacedFile(fs::path file, Link& link) : file_(std::move(file)) {
   link(file_, name, error);
   if (error) fs::copy_file(file_, name, error);
   if (error) {
-    std::error_code ignored; // a part of the copy may be there
+    std::error_code ignored; // of removing a copy that is not complete
     fs::remove(name, ignored);
     throw FileError(ErrorKind::kIo, file_, "its content cannot be kept while it is replaced: " + error.message());
   }

@@ -14,7 +14,7 @@ public:
   using Link = void(const std::filesystem::path& file, const std::filesystem::path& name, std::error_code& error);
 
   /// @param file not a symbolic link; nothing is kept of a file that does not exist
-  /// @param link makes the hard link
+  /// @param link makes the hard link; tests pass one that fails
   /// Throws Error(kIo), which names the file, if it can be neither linked nor copied.
   explicit ReplacedFile(std::filesystem::path file, Link& link = std::filesystem::create_hard_link);
   /// Removes the temporary name.
@@ -28,7 +28,7 @@ public:
 private:
   const std::filesystem::path file_;
   std::filesystem::path kept_; ///< empty: nothing is kept
-  Descriptor lock_;            ///< of the kept name, so that no other process takes it for a stale file
+  Descriptor lock_;            ///< locks kept_, so that no other process removes it as a stale file
 };
 
 } // namespace packtrace

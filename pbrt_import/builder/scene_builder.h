@@ -35,7 +35,8 @@ public:
   /// Adds a track for TrackedMotion; returns its number. Throws MemoryError.
   uint32_t add_track(MotionTrack track);
 
-  /// Adds frames for Directive::sequence; returns their number. The mesh is that of the shape.
+  /// Adds the frames of a mesh; returns their number, for Directive::sequence. MeshSequence::mesh is ignored: it
+  /// becomes the mesh of that shape.
   uint32_t add_sequence(MeshSequence sequence);
 
   /// Reads the files that the scene needs and returns the scene. Call once, after the last directive.

@@ -28,7 +28,7 @@ std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& res
 
 /// Drops meshes and materials that no shape uses, then masks and textures that no material uses, then unused
 /// animations.
-/// @return by old number of a mesh: its new one, or kDropped
+/// @return the new number of each mesh, or kDropped
 std::vector<uint32_t> drop_unused_parts(Scene& scene);
 
 } // namespace packtrace

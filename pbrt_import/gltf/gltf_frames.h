@@ -17,14 +17,14 @@ public:
   /// What all frames share.
   struct Source {
     std::vector<float> positions;            ///< without morph targets and skin, 3 per vertex
-    std::vector<std::vector<float>> targets; ///< displacements by morph target, or empty where no frame needs them
+    std::vector<std::vector<float>> targets; ///< displacements of each morph target; empty if its weight is always 0
     std::vector<JointSet> joints;            ///< checked by check_joints()
     std::vector<uint8_t> used;               ///< by vertex: whether the mesh of the scene has it
-    std::vector<double> mesh_weights;        ///< of morph targets, for frames without weights
+    std::vector<double> mesh_weights;        ///< weights of morph targets in frames without weights of their own
   };
 
   /// @param name of the primitive, for messages
-  /// @param memory is charged with the source while this lives. Throws MemoryError.
+  /// @param memory budget that the source counts against. Throws MemoryError.
   PosedFrames(std::string name, std::shared_ptr<const PoseFrames> poses, Source source, const MemoryBudget& memory);
 
   uint32_t count() const override { return poses_->count; }

@@ -144,13 +144,13 @@ std::string Materials::define_image(const Value& info, MaterialUse& use, std::st
   return name;
 }
 
-/// Index of refraction with the reflectance of the material's when looked at straight: KHR_materials_specular scales
-/// what KHR_materials_ior gives.
+/// Index of refraction that gives the material's reflectance at normal incidence: that of KHR_materials_ior, scaled by
+/// KHR_materials_specular.
 float Materials::index_of(const Value& material) {
-  constexpr double kDefault = 1.5, kMost = 1000.0;
+  constexpr double kDefault = 1.5, kMaxIndex = 1000.0;
   const std::optional<Value> ior = material.extension("KHR_materials_ior");
   double index = ior ? ior->number_or("ior", kDefault) : kDefault;
-  if (!(index >= 1.0 && index <= kMost)) {
+  if (!(index >= 1.0 && index <= kMaxIndex)) {
     warn(material.path() + " has an index of refraction of " + to_text(index) +
          ", which is not within 1 and 1000; it counts as 1.5");
     index = kDefault;

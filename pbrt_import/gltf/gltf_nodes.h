@@ -30,7 +30,9 @@ struct PlacedNode {
 /// no usable scene.
 std::vector<PlacedNode> place_nodes(Document& document, const Animation& animation, double time);
 
-/// The same nodes at another time.
+/// Evaluates the animation at another time.
+/// @param nodes those that place_nodes() returned, at any time
+/// @return the same nodes with the transforms and weights of that time
 std::vector<PlacedNode> nodes_at(Document& document, const Animation& animation, std::span<const PlacedNode> nodes,
                                  double time);
 

@@ -17,10 +17,10 @@ using JointMaps = std::shared_ptr<const std::vector<DAffine>>;
 /// What deforms a mesh in each frame of its animation.
 struct PoseFrames {
   uint32_t count = 0;                       ///< at least 2
-  double frames_per_second = 0.0;           ///< for which the frames repeat with the animation
-  std::vector<std::vector<double>> weights; ///< of morph targets by frame; empty: the mesh's own
-  std::vector<JointMaps> joints;            ///< of the skin by frame; null: no skin
-  MemoryReservation memory{};               ///< for the above
+  double frames_per_second = 0.0;           ///< count / span of the animation, so that both repeat together
+  std::vector<std::vector<double>> weights; ///< weights of morph targets by frame; empty: the mesh's own
+  std::vector<JointMaps> joints;            ///< joint maps of the skin by frame; null: no skin
+  MemoryReservation memory{};               ///< of weights and joints
 };
 
 /// What deforms a mesh at the scene's time.
@@ -35,12 +35,12 @@ struct Pose {
 /// The skins of a document.
 class Skins {
 public:
-  /// @param nodes of the scene, at any time
+  /// @param nodes of the scene; only their numbers are used
   Skins(Document& document, std::span<const PlacedNode> nodes);
 
   /// Maps of a skin's joints. Throws Error(kInput) if the skin is malformed or has a joint outside the scene;
   /// MemoryError.
-  /// @param nodes those of the constructor, at the time of the maps
+  /// @param nodes the constructor's, at the time for which the maps are wanted
   std::vector<DAffine> joint_maps(uint64_t skin, std::span<const PlacedNode> nodes);
   /// Whether an animation moves any of a skin's joints. Throws like joint_maps().
   bool moves(uint64_t skin, std::span<const PlacedNode> nodes);
@@ -54,7 +54,7 @@ private:
   Skin read(uint64_t skin) const;
 
   Document& document_;
-  std::vector<size_t> places_; ///< of placed nodes by number of a node; kNoNode: outside the scene
+  std::vector<size_t> places_; ///< index of each node of the document among the placed ones; kNoNode: none
   std::map<uint64_t, Skin> known_;
 };
 
@@ -63,7 +63,7 @@ struct JointSet {
   std::vector<float> joints, weights; ///< four of each per vertex
 };
 
-/// The skins of a document at one time. Users of a skin share its maps.
+/// The joint maps of a document's skins at one time. Meshes with the same skin share them.
 class PosedSkins {
 public:
   /// The arguments must outlive this.
@@ -77,15 +77,16 @@ private:
   std::map<uint64_t, JointMaps> known_;
 };
 
-/// Throws Error(kInput), at the primitive, if a set has other numbers of joints or weights than four per vertex, or a
-/// vertex hangs on a joint that the skin lacks.
+/// Throws Error(kInput), at the primitive, unless each set has four joints and four weights per vertex, and the skin
+/// has all joints whose weight is above 0.
 void check_joints(std::span<const JointSet> sets, uint64_t vertices, size_t joint_count, const Value& primitive);
 
-/// Adds the displacements of a morph target to positions or normals; what lies beyond either is left as it is.
+/// Adds the displacements of a morph target, times its weight, to positions or normals. If the arrays differ in length,
+/// only their common part is used.
 void add_target(std::span<const float> displacements, double weight, std::span<float> values);
 
 /// Moves positions and normals (empty: none) with the joints. Source: glTF 2.0 specification, section 3.7.3.3.
-/// Vertices without weights stay.
+/// Vertices without weights do not move.
 /// @param sets checked by check_joints()
 void move_with_joints(std::span<const DAffine> joint_maps, std::span<const JointSet> sets,
                       std::vector<float>& positions, std::vector<float>& normals);

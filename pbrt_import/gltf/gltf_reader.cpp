@@ -74,10 +74,10 @@ void Reader::collect_mesh(size_t placed, Skins& skins, PosedSkins& posed_skins) 
   uses_.push_back(std::move(use));
 }
 
-/// Evaluates what deforms the meshes in all frames.
+/// Evaluates the weights of morph targets and the joint maps of all frames.
 void Reader::collect_frames(Skins& skins) {
   const double span_s = animation_.span().end_s - animation_.span().begin_s;
-  std::map<size_t, std::shared_ptr<PoseFrames>> moving; // by index of the use
+  std::map<size_t, std::shared_ptr<PoseFrames>> moving; // by index in uses_
   for (size_t i = 0; i < uses_.size(); ++i)
     if (uses_[i].deforms) moving[i] = std::make_shared<PoseFrames>();
   if (moving.empty() || !(span_s > 0.0)) return;

@@ -37,7 +37,7 @@ private:
     uint64_t mesh = 0;
     size_t placed = kNoNode;                              ///< the node; none for skins, which joints move
     std::vector<DAffine> node_from_mesh = {DAffine(1.0)}; ///< of its instances
-    size_t weights_of = kNoNode;                          ///< placed node with the weights of morph targets
+    size_t weights_of = kNoNode;                          ///< placed node whose weights the morph targets have
     std::optional<uint64_t> skin;
     Pose pose;
     bool deforms = false; ///< the animation moves its morph targets or its joints
@@ -62,7 +62,7 @@ private:
   DAffine world_from_file_;
   std::unique_ptr<Document> document_;
   Animation animation_;
-  double pose_time_; ///< of morph targets and skins
+  double pose_time_; ///< of morph targets and skins, in seconds
   std::vector<PlacedNode> nodes_;
   std::vector<PlacedNode> posed_; ///< at the time of morphs and skins; empty: as nodes_
   NodeTracks tracks_;

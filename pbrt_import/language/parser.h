@@ -36,7 +36,7 @@ struct Directive {
   ParameterList parameters;
   MemoryReservation memory;        ///< reservation for large parameters
   TrackedMotion motion;            ///< of ObjectInstance and Camera; never of text
-  uint32_t sequence = kNoSequence; ///< of Shape: number that SceneBuilder gave its frames; never of text
+  uint32_t sequence = kNoSequence; ///< of Shape: from SceneBuilder::add_sequence(); never of text
   bool damaged = false;            ///< its numbers or names are malformed, which was reported; only kind is valid
 };
 

@@ -46,7 +46,7 @@ public:
   /// Moves the ObjectInstance or Camera that is being made. Where it stands at the scene's time, the current transform
   /// says.
   void moves(const TrackedMotion& motion) { directive_.motion = motion; }
-  /// Gives frames to the mesh of the Shape that is being made. Its positions must be those of frame 0.
+  /// Gives frames to the mesh of the current Shape, whose positions must be those of frame 0.
   void deforms(const MeshSequence& sequence) { directive_.sequence = builder_.add_sequence(sequence); }
   /// Executes the directive. Throws like SceneBuilder::handle(); MemoryError with the directive's place.
   void send();

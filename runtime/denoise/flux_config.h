@@ -47,8 +47,8 @@ struct FluxConfig {
   /// Reject history from another instance.
   bool reprojection_instance_test = true;
 
-  /// Where the history of a pixel is lost, or nearly so, it starts from the histories of its surface up to about 3
-  /// pixels around, with this fraction of their length, at most that of max_tspp_moving. 0: no history instead. [0..1]
+  /// A pixel that has lost its history takes over the mean of those of its surface within 3 pixels, at this fraction of
+  /// their length, which counts up to max_tspp_moving. 0: it starts without history. [0..1]
   float reprojection_nearby = 0.35f;
 
   /// Number of filter passes: the first ones of the steps 1, 2, 4 and 1 pixels. [0..4]

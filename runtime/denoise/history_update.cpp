@@ -79,7 +79,7 @@ private:
     return {h.mean.row(y), h.samples.row(y), h.square.row(y), h.fast.row(y)};
   }
 
-  /// Row y of the history, in its pixels.
+  /// Row y of the history, not resampled, with moments as floats.
   PastRow unmoved(History& h, int y) {
     float *square = past_moments_.data(), *fast = square + width_;
     kernels_.unpack(width_, h.square.row(y), square), kernels_.unpack(width_, h.fast.row(y), fast);

@@ -10,14 +10,14 @@
 namespace packtrace {
 namespace {
 
-/// The surface whose history is looked for, and where it was in the previous frame.
+/// A surface point without history: its disparity in the previous frame and what must match there.
 struct LostSurface {
   float disparity, tolerance;
   int nx, ny, nz;
   uint32_t instance;
 };
 
-/// How well a pixel of the previous frame matches: 0 for another surface, up to 1.
+/// Weight of a pixel of the previous frame: 0 if it shows another surface, at most 1.
 float agreement(const Guides& guides, int y, ptrdiff_t at, const LostSurface& lost, const FluxConfig& config) {
   const float there = guides.disparity.row(y)[at], distance = std::abs(there - lost.disparity);
   if (!(there > 0.0f) || !(distance <= 2.0f * lost.tolerance)) return 0.0f;
@@ -97,7 +97,7 @@ void ReprojectionRows::look_nearby(const MotionFrame& frame, int y) {
     if (weights_[x] > kLostWeight || !(located_.disparity[x] > 0.0f)) continue;
     const LostSurface lost{located_.disparity[x],  located_.tolerance[x],  now.normal_x.row(y)[x],
                            now.normal_y.row(y)[x], now.normal_z.row(y)[x], now.instance.row(y)[x]};
-    // The square lies around the nearest pixel of the footprint, and inside the planes' borders.
+    // The square is centred at the footprint's nearest pixel. It stays within the borders of the planes.
     const float fx = located_.fraction_x[x], fy = located_.fraction_y[x];
     const int right = fx >= 0.5f ? 1 : 0, down = fy >= 0.5f ? 1 : 0;
     const ptrdiff_t corner = ptrdiff_t{located_.offset[x]} + x;

@@ -31,8 +31,8 @@ struct MotionFrame {
 /// Where the neighbourhood lies on one surface, the AO mean is interpolated with bicubic precision along each axis, so
 /// that camera pans do not blur it.
 /// The sample count is scaled by the sum of the weights, so partial agreement shortens the history.
-/// Where that sum is at most kLostWeight, as on edges thinner than a pixel, which come and go between the camera rays,
-/// the history starts from the weighted mean of nearby pixels of the surface, but with a part of their length only
+/// Where that sum is at most kLostWeight, as on edges thinner than a pixel, which camera rays do not meet in every
+/// frame, the history is the weighted mean of those of the surface's nearby pixels, at a fraction of their length
 /// (FluxConfig::reprojection_nearby).
 /// Depth is compared where the surface was: tolerances are those of its disparity in the previous frame, with the
 /// change of disparity per pixel scaled in proportion.

@@ -82,8 +82,8 @@ struct FrameConfig {
   AoConfig ao;
   DenoiserConfig denoiser;
   DetailConfig detail;
-  /// Occlusion rays see instances smaller than so many pixels as the voxels of the file where that makes them faster
-  /// (ProxyChoice), > 0; unset: as triangles. Not with levels of detail, interreflection or things that move.
+  /// Size in pixels, > 0, below which occlusion rays meet an instance's voxels in place of its triangles, where that is
+  /// faster (ProxyChoice). Unset: always triangles. Not with levels of detail, interreflection or things that move.
   std::optional<double> proxy_beyond_px;
 
   bool shades() const { return view != FrameView::kAo; }

@@ -97,7 +97,7 @@ private:
   std::unique_ptr<RayTracer> level_tracer_;   ///< traces planner_->source()
   std::unique_ptr<RayTracer> proxy_tracer_;   ///< null if no instance is seen as its proxy
   std::unique_ptr<ProxyChoice> proxy_choice_; ///< null until one is needed
-  std::vector<uint32_t> proxied_;             ///< by proxy_tracer_
+  std::vector<uint32_t> proxied_;             ///< instances that proxy_tracer_ traces as voxels
   std::unique_ptr<MeshMotion> meshes_;        ///< null if no mesh deforms
   std::unique_ptr<InstanceBoxes> boxes_;      ///< null if nothing moves
   bool started_ = false;                      ///< there is a frame before

@@ -12,8 +12,8 @@ Bounds box_of(const std::vector<Bounds>& boxes, const std::vector<uint32_t>& ord
   return box;
 }
 
-/// Sorts things along the longest extent of their centres, and returns the middle one: halves keep the depth of the
-/// tree within that of its number of things.
+/// Partitions things at the median along the longest extent of their centres; returns its place. Equal halves keep the
+/// tree as shallow as the number of things allows.
 size_t split(const std::vector<Bounds>& boxes, std::vector<uint32_t>& order, size_t begin, size_t end) {
   Bounds centers;
   for (size_t i = begin; i < end; ++i) centers.extend(boxes[order[i]].centre());
@@ -38,7 +38,7 @@ ThingTree::ThingTree(const std::vector<Bounds>& boxes) {
   centre_ = all.centre();
   const DVec3 extent = all.extent();
   scale_ = 2.0 / std::max({extent.x, extent.y, extent.z});
-  if (!std::isfinite(scale_)) scale_ = 1.0; // of points
+  if (!std::isfinite(scale_)) scale_ = 1.0; // all boxes are one point
   build(boxes, order, 0, order.size());
 }
 

@@ -12,15 +12,15 @@
 
 namespace packtrace {
 
-/// A tree over the boxes of things, four boxes to a node. Boxes are tested in floats, widened by what that loses.
+/// A tree over the boxes of things, four boxes to a node. Boxes are tested in floats, widened by the rounding errors.
 class ThingTree {
 public:
   ThingTree() = default;
-  /// @param boxes of things that are numbered in this order; not empty ones
+  /// @param boxes of things 0, 1, ...; none is empty
   explicit ThingTree(const std::vector<Bounds>& boxes);
 
-  /// Visits things whose boxes a ray meets before t_max, roughly near ones first: t_max = visit(thing, t_max). Ends
-  /// once that is not above t_min.
+  /// Calls visit(thing, t_max) for things whose boxes a ray meets before t_max, roughly from near to far. What it
+  /// returns is the new t_max; at most t_min ends the traversal.
   template <class Visit>
   void visit(DVec3 origin, DVec3 direction, double t_min, double t_max, const Visit& visit) const {
     if (nodes_.empty() || !(t_max > t_min)) return;
@@ -58,16 +58,16 @@ private:
   using Floats [[gnu::vector_size(16)]] = float;
 
   struct Node {
-    std::array<Floats, kAxes> low, high; ///< without a child: a box that no ray meets
+    std::array<Floats, kAxes> low, high; ///< of each child; no ray meets those of missing children
     std::array<int32_t, kWidth> child;   ///< a node; below 0: ~thing
   };
   struct Open {
-    float t; ///< where the ray enters, or less
+    float t; ///< lower bound of where the ray enters
     int32_t what;
   };
 
-  /// A ray in the tree's units. Origins are shifted, towards later entries and exits, by more than the floats of origin
-  /// and planes lose.
+  /// A ray in the tree's units. Two origins, shifted by more than the rounding errors of origin and planes, make
+  /// entries earlier and exits later.
   struct BoxRay {
     std::array<float, kAxes> near_origin, far_origin, inverse;
     std::array<bool, kAxes> falling;
@@ -92,7 +92,7 @@ private:
       for (size_t a = 0; a < kAxes; ++a) {
         const Floats near = ((falling[a] ? node.high : node.low)[a] - near_origin[a]) * inverse[a] * (1.0f - 0x1p-20f),
                      far = ((falling[a] ? node.low : node.high)[a] - far_origin[a]) * inverse[a] * (1.0f + 0x1p-20f);
-        enter = near > enter ? near : enter; // not for a NaN: the ray lies in a face
+        enter = near > enter ? near : enter; // false for NaN, which comes of rays that lie in a face
         leave = far < leave ? far : leave;
       }
       return enter <= leave ? enter : Floats{} + kMissed;

@@ -82,7 +82,8 @@ trace(const OccupancyStream& stream, glm::vec<3, Real> origin, glm::vec<3, Real>
   }
 }
 
-// Clang refuses members in several versions that a source of the same batch has called before.
+// Free functions, because clang refuses several versions of a function after its first call, and another source of the
+// same batch may have called the members.
 PACKTRACE_AVX2_CLONES std::optional<VoxelHit<double>> trace_double(const OccupancyStream& stream, glm::dvec3 origin,
                                                                    glm::dvec3 direction, double t_min, double t_max) {
   return trace<double>(stream, origin, direction, t_min, t_max);

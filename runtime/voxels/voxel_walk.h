@@ -75,7 +75,7 @@ public:
   }
 
   Real t() const { return t_; }
-  /// Of the face that the ray entered the voxel through; -1 if it began inside.
+  /// Axis of the face through which the ray entered the voxel; -1 if it began inside.
   int axis() const { return exit_[0] != 0 ? 0 : exit_[1] != 0 ? 1 : exit_[2] != 0 ? 2 : -1; }
   VoxelIndex voxel() const {
     return {static_cast<uint32_t>(voxel_[0]), static_cast<uint32_t>(voxel_[1]), static_cast<uint32_t>(voxel_[2])};
@@ -85,29 +85,30 @@ private:
   using Ints [[gnu::vector_size(16)]] = int32_t;
   using Reals [[gnu::vector_size(4 * sizeof(Real))]] = Real;
   using Wide = std::conditional_t<sizeof(Real) == 4, int32_t, int64_t>;
-  using Masks [[gnu::vector_size(4 * sizeof(Real))]] = Wide; // what comparisons of Reals give
+  using Masks [[gnu::vector_size(4 * sizeof(Real))]] = Wide; // the type of comparisons of Reals
 
-  static constexpr uint32_t kSteppedShift = 1; // of cells that are left voxel by voxel, which is faster for small ones
+  // Cells of at most 2^kSteppedShift voxels along each axis are left voxel by voxel, which is faster.
+  static constexpr uint32_t kSteppedShift = 1;
   static constexpr Real kNever = std::numeric_limits<Real>::infinity();
 
   static constexpr size_t at(int axis) { return static_cast<size_t>(axis); }
   [[gnu::always_inline]] Real crossing(int axis, int32_t plane) const {
     return (Real(plane) - origin_[axis]) * inverse_[axis];
   }
-  /// Keeps a lane from being chosen: the t of its planes is infinite or, of plane 0, no number.
+  /// Excludes a lane from choose_exit(): its planes have infinite t, or NaN for plane 0.
   [[gnu::always_inline]] void stand_still(int lane) {
     origin_[lane] = direction_[lane] = 0, inverse_[lane] = kNever, plane_[lane] = 0;
   }
 
-  /// Where the ray crosses a plane of each axis; infinite if it does not, also for a NaN.
+  /// The t at which the ray crosses one plane per axis; infinite if it does not, and in place of NaN.
   [[gnu::always_inline]] void find_crossings(const Reals& planes, Reals& t) const {
     const Reals found = (planes - origin_) * inverse_, never = Reals{} + kNever;
     t = found < never ? found : never;
   }
 
-  /// Chooses the lane of the smallest t, of equal ones the lowest axis; t_ becomes its t.
+  /// Chooses the lane with the smallest t, of equal ones that of the lowest axis, and sets t_ to its t.
   [[gnu::always_inline]] void choose_exit(const Reals& t) {
-    constexpr Masks kLower1{-1, -1, 0, 0}, kLower2{-1, 0, 0, 0}; // lanes whose axis is below the shuffled one's
+    constexpr Masks kLower1{-1, -1, 0, 0}, kLower2{-1, 0, 0, 0}; // lanes that win against an equal shuffled t
     const Reals t1 = __builtin_shufflevector(t, t, 1, 2, 0, 3), t2 = __builtin_shufflevector(t, t, 2, 0, 1, 3);
     exit_ = ((t < t1) | ((t <= t1) & kLower1)) & ((t < t2) | ((t <= t2) & kLower2));
     const Reals least = t1 < t2 ? t1 : t2;
@@ -133,8 +134,8 @@ private:
     return (out[0] | out[1] | out[2]) == 0;
   }
 
-  /// The voxel of low..high along an axis such that of the planes between them those are crossed that the ray passes
-  /// before it.
+  /// Corrects a guessed voxel along an axis, within low..high: the ray has crossed the plane behind the result, but not
+  /// the one ahead.
   template <class Crossed>
   [[gnu::always_inline]] static int32_t settle(bool up, int32_t guess, int32_t low, int32_t high,
                                                const Crossed& crossed) {
@@ -155,7 +156,8 @@ private:
     find_crossings(__builtin_convertvector(low + (size & rising), Reals), t);
     choose_exit(t);
     if (!(t_ < t_max)) return false;
-    // Along the other axes: the voxel at t, if the plane behind it is crossed and the one ahead is not.
+    // The voxel along the other axes is guessed from the position at t_. The guess is right if the ray has crossed the
+    // plane behind it, but not the one ahead.
     const Ints first = rising ? voxel_ : low, last = rising ? low + (size - 1) : voxel_;
     const Reals from = __builtin_convertvector(first, Reals), to = __builtin_convertvector(last, Reals);
     Reals position = origin_ + t_ * direction_;
@@ -177,7 +179,7 @@ private:
     return true;
   }
 
-  /// Corrects the guesses of `others` within low..high.
+  /// Corrects the guessed voxels of the lanes in `others`, within low..high.
   [[gnu::noinline]] void settle_lanes(const Ints& low, const Ints& high, const Ints& others, const Masks& lower) {
     for (int a = 0; a < 3; ++a)
       if (others[a] != 0)
@@ -193,10 +195,10 @@ private:
   }
 
   Reals origin_{}, direction_{}, inverse_{};
-  Reals plane_{}, plane_step_{}; // the plane that the ray leaves the voxel through along each axis; 1, -1 or 0
+  Reals plane_{}, plane_step_{}; // the plane ahead along each axis; how it moves in a step: 1, -1 or 0
   Reals next_{};                 // t of those planes
   Ints size_{}, voxel_{}, step_{};
-  Masks exit_{}; // all bits of the lane whose plane was crossed last
+  Masks exit_{}; // all bits set in the lane whose plane was crossed last
   Real t_ = 0;
 };
 

@@ -83,7 +83,7 @@ public:
   void keep(const GBuffer& g, const std::vector<float>& ao) {
     before_ = ao, before_z_ = g.view_z, before_instance_ = g.instance;
   }
-  /// With the frame that was kept.
+  /// Adds the changes of AO since the frame that keep() got.
   void compare(const GBuffer& g, const std::vector<float>& ao) {
     for (uint32_t y = 0; y < g.size.height; ++y)
       for (uint32_t x = 0; x < g.size.width; ++x) compare(g, ao, x, y);

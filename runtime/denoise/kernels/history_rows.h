@@ -17,11 +17,11 @@ inline constexpr int32_t kNoOffset = INT32_MIN;
 /// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
 inline constexpr float kMinHistoryWeight = 1e-3f;
 
-/// Up to this weight histories of nearby pixels replace that of the footprint.
+/// Histories with at most this total weight are lost. Those of nearby pixels replace them.
 inline constexpr float kLostWeight = 0.2f;
 
-/// Nearby pixels are those in a square of 2 kNearbyRadius + 1 pixels around the nearest one. Their weights fall to 0 at
-/// the distance kNearbyReach.
+/// Nearby pixels are those in a square of 2 kNearbyRadius + 1 pixels around the footprint's nearest pixel. Their
+/// weights fall to 0 at the distance kNearbyReach.
 inline constexpr int kNearbyRadius = 2;
 inline constexpr float kNearbyReach = 3.0f;
 
@@ -124,7 +124,7 @@ struct HistoryKernels {
                       const PastRow& out, float* weights),
              kMaxNormalSquarings + 1>
       resample;
-  /// A row of moments from units of 1 / kMomentUnits.
+  /// Converts a row of moments from units of 1 / kMomentUnits.
   void (*unpack)(int width, const uint16_t* moments, float* out);
   /// Adds samples to a row of the history, perhaps in place.
   void (*accumulate)(int width, const float* ao, const float* disparity, const HistoryLengths& longest,

@@ -14,7 +14,7 @@ constexpr float kSquaredNormalUnit = kNormalUnit * kNormalUnit;
 inline float lesser(float a, float b) { return b < a ? b : a; }
 inline float greater(float a, float b) { return a < b ? b : a; }
 
-/// From and to units of 1 / kMomentUnits. NaN becomes 0.
+/// Convert moments from and to units of 1 / kMomentUnits. NaN becomes 0.
 inline float moment_of(uint16_t units) { return static_cast<float>(static_cast<int>(units)) * (1.0f / kMomentUnits); }
 inline uint16_t in_moment_units(float moment) {
   const float bounded = lesser(greater(0.0f, moment), 1.0f);

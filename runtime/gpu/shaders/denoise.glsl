@@ -47,7 +47,7 @@ float moment_of(uint units) {
   precise float moment = float(units) * (1.0 / kMomentUnits);
   return moment;
 }
-// In units of 1 / kMomentUnits, of which the upper and the lower half of a word hold one each. NaN becomes 0.
+// To units of 1 / kMomentUnits, 16 bits. NaN becomes 0.
 uint in_moment_units(float moment) {
   precise float scaled = lesser(greater(0.0, moment), 1.0) * kMomentUnits + 0.5;
   return uint(scaled);

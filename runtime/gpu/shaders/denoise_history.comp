@@ -140,7 +140,7 @@ float sharpened(float linear, Located l, uint instance) {
   return lesser(greater(sharp, 0.0), 1.0);
 }
 
-// The history of the surface around its previous position, if there is any.
+// The mean history of the same surface around its previous position; false if there is none.
 bool nearby(Located l, uvec4 guide, ivec3 normal, out Past past) {
   const int radius = int(kNearbyRadius);
   ivec2 nearest = ivec2(greaterThanEqual(l.fraction, vec2(0.5)));

@@ -248,7 +248,7 @@ Mesh strands_mesh(uint32_t count, uint32_t steps, uint32_t sides, double radius,
   Random random(seed);
   Mesh mesh;
   for (uint32_t i = 0; i < count; ++i) {
-    // One number a declarator: compilers evaluate arguments in different orders.
+    // One draw per declarator: the order in which arguments are evaluated is unspecified.
     const double root_y = random.uniform(0, 1), root_x = random.uniform(0, 1);
     const DVec3 root(root_x, root_y, 0.0);
     const double height = random.uniform(0.6f, 1.2f);

@@ -38,7 +38,7 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
       const bool seen = x >= 3 && y + 2 < 21;
       ASSERT_EQ(out.samples[x], seen ? 7.0f : 0.0f);
       ASSERT_EQ(out.mean[x], seen ? previous.history.mean.row(y + 2)[x - 3] : 0.0f);
-      // Moments have whole units, so that rounding finds the same ones again.
+      // These moments are multiples of their storage unit, so storing them changes nothing.
       ASSERT_EQ(std::lround(out.square[x] * kMomentUnits), seen ? previous.history.square.row(y + 2)[x - 3] : 0);
       ASSERT_EQ(std::lround(out.fast[x] * kMomentUnits), seen ? previous.history.fast.row(y + 2)[x - 3] : 0);
     }

@@ -15,8 +15,8 @@ namespace packtrace {
 /// exact, so triangles that cover a flat part leave nothing of it, however their borders cross it.
 class TriangleSubtraction {
 public:
-  /// Has at most nine corners after all cuts; polygons that would get more are kept whole. Copies contain only the
-  /// corners in use, which are few.
+  /// Has at most nine corners after all cuts; polygons that would get more are kept whole. Copying copies only the
+  /// corners in use.
   struct Polygon {
     std::array<DVec3, 12> corners;
     uint32_t count = 0;
@@ -88,7 +88,7 @@ private:
     double offset;
     bool set(const std::array<DVec3, 3>& triangle); ///< returns false without area
     double largest_height(const Polygon& polygon) const;
-    double least_height(const Polygon& polygon) const;   ///< of any point of the polygon; 0 where it meets the plane
+    double least_height(const Polygon& polygon) const; ///< smallest distance from the plane; 0 if the polygon meets it
     bool is_beyond_a_side(const Polygon& polygon) const; ///< whether all corners are beyond the same side
   };
 
