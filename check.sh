@@ -46,7 +46,9 @@ for preset in "${presets[@]}"; do
   # Scripts and the Python module are tested with Debian's interpreter, whichever comes first in the PATH.
   options=(-DPython_EXECUTABLE=/usr/bin/python3)
   case $preset in # with the same options, asan finds the objects of tests in ccache
-    release) options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all -DPACKTRACE_BUILD_PYTHON=ON) ;;
+    release)
+      options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all -DPACKTRACE_BUILD_PYTHON=ON -DPACKTRACE_TEST_PROGRAMS=ON)
+      ;;
     asan) options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all) ;;
   esac
   cmake --preset "$preset" "${options[@]}" >/dev/null

@@ -14,6 +14,9 @@ inline bool sanitized() {
 #endif
 }
 
+/// Why a test that takes long with sanitizers is skipped there.
+inline constexpr const char* kOthersRunItsCode = "other tests run the same code under sanitizers in less time";
+
 /// Number of rays, repeats and the like for a test: an eighth of `count` with sanitizers.
 template <typename Number>
 Number fewer(Number count) {

@@ -16,6 +16,7 @@
 #include "assets/generator/town.h"
 #include "pbrt_import/base/error.h"
 #include "tests/assets/folder_content.h"
+#include "tests/sanitized.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace::scenegen {
@@ -50,6 +51,7 @@ TEST(Generators, SameSeedGivesTheSameBytes) {
 }
 
 TEST(Generators, AnotherSeedGivesAnotherScene) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const TemporaryFolder folder;
   const auto a = generate_all(folder / "a", 42), b = generate_all(folder / "b", 43);
   for (const char* name : {"town/town_instances.pbrt", "forest/forest_instances.pbrt", "mesh/geometry/ring.ply",
@@ -60,6 +62,7 @@ TEST(Generators, AnotherSeedGivesAnotherScene) {
 }
 
 TEST(Generators, ThreadCountDoesNotShow) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const TemporaryFolder folder;
   for (const size_t threads : {1, 4}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

@@ -8,6 +8,7 @@
 #include <tbb/global_control.h>
 
 #include "tests/compress/bake_checks.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -143,6 +144,7 @@ TEST(BakeScene, WindingCarriesTheNormalThroughMirrorsInsideObjects) {
 }
 
 TEST(BakeScene, BytesDoNotDependOnThreads) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene = scene_of(test::grid_mesh(150, 0.3f, true)); // large enough for several parallel chunks
   for (uint32_t i = 0; i < 20; ++i)
     test::add_shape(scene, test::sphere_mesh(4 + i), test::translation({static_cast<double>(i), 0, 0}));

@@ -8,6 +8,7 @@
 #include "compress/bake/proxies/geometry_field.h"
 #include "compress/bake/proxies/geometry_voxels.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -42,6 +43,7 @@ double brute_distance(const BuiltField& built, VoxelIndex v) {
 }
 
 TEST(DistanceFieldCodec, StoredDistancesAreExactToTheirQuantisation) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   for (const uint32_t bits : {8u, 16u}) {
     const BuiltField built = field_of(test::soup_mesh(60, 5), 24, bits);
     const DistanceField& field = built.result.field;
@@ -120,6 +122,7 @@ TEST(DistanceFieldCodec, EveryPrefixIsAFaultAndEveryChangedBitIsOneOrReadable) {
 }
 
 TEST(DistanceFieldCodec, AFieldBeyondTheMemoryNamesTheLargestThatFits) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const BakedFile file = BakedFile::from_bytes(test::bake(test::scene_of(test::sphere_mesh(10))).bytes);
   const OccludingTriangles source = occluding_triangles(file, 0, material_runs(file.sections())[0]);
   ProxyConfig config;

@@ -14,6 +14,7 @@
 #include "pbrt_import/base/error.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -166,7 +167,7 @@ TEST_P(PageCodecs, DamageWithRightHashesIsRefusedOrHarmless) {
   const Bytes plain = expand_paged_file(disk, "memory", form);
   test::Random random(21);
   uint32_t refused = 0;
-  for (int round = 0; round < 20000; ++round) {
+  for (int round = 0; round < test::fewer(20000); ++round) {
     Bytes bytes = disk;
     const uint32_t changes = 1 + random.bits() % 3;
     for (uint32_t i = 0; i < changes; ++i) {

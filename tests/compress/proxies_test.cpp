@@ -12,6 +12,7 @@
 #include "compress/format/voxels/proxy_section.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -137,7 +138,7 @@ TEST(Proxies, MasksLeaveHoles) {
     std::erase_if(source.triangles, [](const OccludingTriangle& t) { return !t.masked; });
     if (source.triangles.empty()) continue;
     ProxyConfig config;
-    config.voxels = 200;
+    config.voxels = test::sanitized() ? 100 : 200;
     const uint64_t with = voxelize(file, runs[g], source, config, MemoryBudget(), "masked").set.count();
     for (OccludingTriangle& t : source.triangles) t.masked = false;
     const uint64_t without = voxelize(file, runs[g], source, config, MemoryBudget(), "masked").set.count();

@@ -16,6 +16,7 @@
 #include "pbrt_import/import_scene.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/compress/world_faces.h"
+#include "tests/sanitized.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -138,6 +139,7 @@ TEST(ObjExport, CompanionsAreKnownBefore) {
 
 /// What the export holds at a time does not grow with the number of instances.
 TEST(ObjExport, InstancesAreStreamed) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene = test::mixed_scene();
   ASSERT_FALSE(scene.instances.empty());
   for (int i = 0; i < 500; ++i) {
@@ -158,6 +160,7 @@ TEST(ObjExport, InstancesAreStreamed) {
 
 /// What the export holds at a time does not grow with the size of a mesh.
 TEST(ObjExport, LargeMeshesAreStreamed) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const BakedScene baked = test::bake(test::scene_of(test::grid_mesh(300, 0.1f)));
   Progress progress;
   uint64_t total = 0;

@@ -131,6 +131,7 @@ TEST(CommandLine, DetailForOcclusionRaysLeavesWhatTheCameraSees) {
 }
 
 TEST(CommandLine, DetailLooksTheSameForAnyNumberOfThreads) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const BallsBench bench;
   ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--lod", "all"}).exit_code, 0);
   for (const char* scheme : {"steps", "one-provider", "off"}) {
@@ -268,6 +269,7 @@ TEST(CommandLine, RenderNamesItsBackend) {
 }
 
 TEST(CommandLine, TexturesOfTheFileLookLikeThoseOfTheScene) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const TemporaryFolder directory;
   const std::string scene = PACKTRACE_SOURCE_DIR "/assets/textured/textured.pbrt", baked = directory / "t.ptk";
   const auto render = [&](const std::string& from, const std::string& to) {

@@ -6,6 +6,7 @@
 #include <locale>
 
 #include "tests/pbrt_import/hostile_scene.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -48,6 +49,7 @@ std::string listed(int count, Item item) {
 }
 
 TEST(HostileSizes, MillionParametersOnOneDirective) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const SceneFolder folder;
   const auto import = [&](int count) {
     return timed_import(folder, world(kTri + listed(count, [](int i) { return numbered("\"float p", i) + "\" 1\n"; })));
@@ -60,6 +62,7 @@ TEST(HostileSizes, MillionParametersOnOneDirective) {
 }
 
 TEST(HostileSizes, SameParameterAMillionTimes) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const SceneFolder folder;
   const Timed large = timed_import(folder, world(kTri + repeated("\"float alpha\" 0 ", 999'999) + "\"float alpha\" 1"));
   EXPECT_EQ(
@@ -78,6 +81,7 @@ TEST(HostileSizes, TwentyThousandObjectsThatAreNeverInstanced) {
 }
 
 TEST(HostileSizes, HundredThousandUnknownDirectives) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const SceneFolder folder;
   const auto import = [&](int count) {
     return timed_import(folder, world(listed(count, [](int i) { return numbered("Nonsense", i) + " Identity\n"; })));
@@ -105,6 +109,7 @@ TEST(HostileSizes, HundredThousandCrossedBlocks) {
 }
 
 TEST(HostileSizes, HundredThousandUnknownMaterials) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const SceneFolder folder;
   const auto import = [&](int count) {
     return timed_import(folder, world(listed(count, [](int i) { return numbered("Material \"matte", i) + "\"\n"; })));

@@ -82,6 +82,7 @@ std::vector<RenderedImage> orbit(const DenoisedScene& scene, FrameLoop& loop, ui
 }
 
 TEST_P(DenoisedScenes, StillViewsConvergeBetterThanTheMeanOfTheirSamples) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   FrameConfig mean = scene_->config();
   mean.denoise = false, mean.view_layers = false;
   FrameLoop ours = scene_->loop(scene_->config()), plain = scene_->loop(mean), other = scene_->loop(reference());
@@ -182,6 +183,7 @@ TEST_P(DenoisedScenes, OrbitsDoNotDependOnTheNumberOfThreads) {
 }
 
 TEST_P(DenoisedScenes, ABoxThatLeavesTakesItsOcclusionAlong) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   constexpr uint32_t kGone = DenoisedScene::kGone;
   const std::map<uint32_t, double> limits{{4, 0.5}, {8, 0.25}, {16, 0.1}, {32, 0.03}};
   const Camera camera = scene_->orbit(0.0);

@@ -11,6 +11,7 @@
 #include "compress/format/trees/packed_trees.h"
 #include "tests/compress/bvh/tree_walk.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -137,6 +138,7 @@ TEST(PackedTrees, WideLatticesAreHalvedUntilTheyFit) {
 }
 
 TEST(PackedTrees, AreTheSameForAnyThreadCount) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene = test::scene_of(test::soup_mesh(20'000, 3));
   test::add_shape(scene, test::sphere_mesh(30));
   const BakedFile file = bake_file(scene);

@@ -14,6 +14,7 @@
 #include "tests/compress/lod/lod_class_meshes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::test {
 namespace {
@@ -212,6 +213,7 @@ TEST(ClusterLod, SheetsOfSeveralLayersKeepTheirOutline) {
 
 /// The borders between groups of such meshes are long; locks that never move would hold up the coarse levels.
 TEST(ClusterLod, SpongesSimplifyToAFewTriangles) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   for (const ClassMesh& mesh : class_meshes()) {
     if (mesh.of_class != "sponge") continue;
     const ClusterLod lod = build_lod(mesh.make()).lod;

@@ -11,6 +11,7 @@
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/lod/surface_distance.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::test {
 namespace {
@@ -67,6 +68,7 @@ protected:
 
 /// Tested in this direction only: the clusters of level 0 that a group was made from extend beyond the group.
 TEST_P(LodErrorOf, IsNotBelowTheDistanceOfEachGroupFromItsPartOfLevelZero) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const ClusterLod& lod = built_.lod;
   // The level 0 clusters that each group stands for.
   std::vector<std::vector<uint32_t>> stands_for(lod.groups.size()), made(lod.groups.size());
@@ -92,6 +94,7 @@ TEST_P(LodErrorOf, IsNotBelowTheDistanceOfEachGroupFromItsPartOfLevelZero) {
 }
 
 TEST_P(LodErrorOf, IsNotBelowTheDistanceOfCuts) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const ClusterLod& lod = built_.lod;
   const std::vector<Triangle> base = triangles_of(cut_clusters(lod, 0.0));
   for (uint32_t level = 0; level + 1 < lod.level_count; ++level) {
@@ -104,6 +107,7 @@ TEST_P(LodErrorOf, IsNotBelowTheDistanceOfCuts) {
 
 /// Guards against errors that only add up over levels.
 TEST(LodError, OfCoarseLevelsIsNotFarAboveTheDistance) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const LodSurfaces surfaces(build_lod(torus_mesh(200, 120)));
   const ClusterLod& lod = surfaces.lod();
   ASSERT_GE(lod.level_count, 4u);
@@ -119,6 +123,7 @@ TEST(LodError, OfCoarseLevelsIsNotFarAboveTheDistance) {
 
 /// If tips of thin parts recede, the cuts of all coarser levels are far off.
 TEST(LodError, OfFinsIsSmall) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const LodSurfaces surfaces(build_lod(fins_mesh(150, 20, 7)));
   const ClusterLod& lod = surfaces.lod();
   ASSERT_GE(lod.level_count, 5u);
@@ -137,6 +142,7 @@ TEST(LodError, OfFinsIsSmall) {
 
 /// Spheres with long spikes, down to a few triangles: images there are far from their preimages.
 TEST(LodError, OfTheLastTrianglesIsNotBelowTheDistance) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   Random random(11);
   for (int body = 0; body < 30; ++body) {
     Mesh mesh = sphere_mesh(20);

@@ -16,6 +16,7 @@
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/pbrt_import/scene_folder.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::test {
 namespace {
@@ -106,6 +107,7 @@ std::vector<double> some_thresholds(const ClusterLod& lod, size_t count) {
 }
 
 TEST(SharedBorders, AClosedSurfaceOfSeveralGeometriesIsClosedAtEveryPairOfLevels) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const std::vector<ClusterLod> parts = bake_levels(scene_of_parts(torus_parts()));
   ASSERT_EQ(parts.size(), 3u);
   for (const ClusterLod& part : parts) ASSERT_GE(part.level_count, 4u);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/runtime/denoise/synthetic.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -40,6 +41,7 @@ TEST(AoDenoiser, ConstantAoStaysConstantUnderAnyGuides) {
 }
 
 TEST(AoDenoiser, FlatNoiseConvergesAtLeastAsFastAsRequiredAndBetterThanAccumulation) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const std::map<uint32_t, double> limits = {{1, 0.045}, {8, 0.025}, {32, 0.015}, {64, 0.011}};
   for (float p : {0.1f, 0.3f, 0.5f, 0.9f}) {
     AoDenoiser denoiser;
@@ -71,6 +73,7 @@ TEST(AoDenoiser, BlurAloneKeepsTheMeanOfAFrameHoweverSkewedTheNoise) {
 }
 
 TEST(AoDenoiser, BlocksOfAFlatHaveTheMeanOfTheNoise) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   for (float p : {0.1f, 0.5f, 0.9f}) {
     AoDenoiser denoiser;
     const DenoisedAo* result = nullptr;
@@ -107,6 +110,7 @@ TEST(AoDenoiser, TsppCountsValidFramesUpToTheCap) {
 }
 
 TEST(AoDenoiser, ConvergedImageDoesNotFlicker) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   AoDenoiser denoiser;
   std::vector<double> sum(kSize.pixels()), squares(kSize.pixels());
   for (uint32_t f = 0; f < 96; ++f) {

@@ -12,6 +12,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/isa.h"
 #include "tests/runtime/denoise/synthetic.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -112,6 +113,7 @@ std::vector<float> run_sequence(size_t threads, const char* isa = nullptr) {
 }
 
 TEST(AoDenoiser, ThreadsAndRepeatsDoNotChangeABit) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const std::vector<float> one = run_sequence(1);
   EXPECT_EQ(one, run_sequence(1));
   EXPECT_EQ(one, run_sequence(2));

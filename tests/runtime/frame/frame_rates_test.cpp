@@ -6,6 +6,7 @@
 #include "runtime/frame/still.h"
 #include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -125,6 +126,7 @@ TEST(FrameRates, CheckerboardsConvergeToTheSameMean) {
 /// Independent noise falls with the square root of the number of samples, so half of them err 1.41 times as much.
 /// Stratified samples err almost in inverse proportion to their number, so half of them err nearly twice as much.
 TEST(FrameRates, ReducedRatesErrAsTheirNumberOfSamplesImplies) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const RateBench bench;
   FrameConfig config = bench.config_;
   config.jitter = false;

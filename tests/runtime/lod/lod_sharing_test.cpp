@@ -10,6 +10,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "tests/runtime/lod/sharing_cases.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::sharing_test {
 namespace {
@@ -46,6 +47,7 @@ std::vector<uint32_t> levels_of_triangles(const LodGeometry& geometry, std::span
 
 /// For every triangle of level 0, an instance uses the level of its own cut or a finer one.
 TEST(LodSharing, StrictSchemesNeverGiveLessDetailThanTheOwnCut) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const std::vector<LodGeometry> geometries = some_geometries(6);
   const std::vector<LodInstance> instances = wild_instances(600, 6, 1);
   for (const SharingScheme scheme : kSchemes)

@@ -10,6 +10,7 @@
 
 #include "runtime/ao/hash.h"
 #include "tests/runtime/shade/shaded_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -177,6 +178,7 @@ private:
 };
 
 TEST(PathTracer, AgreesWithBruteForce) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene;
   SurfaceShading plastic, rough_metal;
   plastic.bits = kFresnelDielectric, plastic.specular = Vec3(1.0f), plastic.roughness = 0.4f;

@@ -9,6 +9,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/frame/still.h"
 #include "tests/runtime/shade/shaded_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -66,6 +67,7 @@ TEST_F(ShadedFrames, AreDenoised) {
 }
 
 TEST_F(ShadedFrames, TakeTheirMeansAlongWithTheCamera) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const FloatSource source(scene_);
   const auto last_of_path = [&](const FrameConfig& config, int frames, bool forget) {
     FrameLoop loop({&source, nullptr, {}}, config);

@@ -7,6 +7,7 @@
 
 #include "runtime/frame/shaded_filter.h"
 #include "runtime/frame/shaded_mean.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -37,6 +38,7 @@ double mean_specular(const ShadedMean& mean) {
 }
 
 TEST(ShadedMean, RareReflectionsKeepTheirEnergyInMotion) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   for (const float chance : {0.02f, 0.1f, 0.5f}) {
     ShadedMean mean;
     std::mt19937 random(5);

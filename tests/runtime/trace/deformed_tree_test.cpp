@@ -240,6 +240,7 @@ TEST(DeformedTree, PreviousVerticesAreThoseOfTheFrameBefore) {
 }
 
 TEST(DeformedTree, NoRayLeavesAClosedSurfaceThatMoves) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene closed;
   test::add_object(closed, test::sphere({0, 0, 0}, 1, 48));
   closed.instances.push_back({0, Affine(1.0f)});

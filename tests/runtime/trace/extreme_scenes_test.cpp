@@ -7,6 +7,7 @@
 #include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/embree_cluster_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -98,6 +99,7 @@ Scene spheres() {
 Mesh floor_of(float size) { return test::quad({-size, 0, -size}, {0, 0, 2 * size}, {2 * size, 0, 0}); }
 
 TEST(ExtremeScenes, AFloorOfAnySizeLiesBelowWhatStandsOnIt) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const auto standing_on = [](float size) {
     Scene scene;
     add_shape(scene, floor_of(size));
@@ -125,6 +127,7 @@ TEST(ExtremeScenes, TinyAndEnormousInstancesLieBesideOthers) {
 }
 
 TEST(ExtremeScenes, AGeometryOfAnySizeLiesBesideOthers) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const auto above = [](float size) {
     Scene scene = spheres();
     scene.instances.push_back({add_object(scene, floor_of(size)), Affine(placed({0, -0.5, 0}))});
@@ -163,6 +166,7 @@ Work work_per_ray(const Scene& scene, double size) {
 }
 
 TEST(ExtremeScenes, AnInstanceFarAwayDoesNotMakeRaysEnterAllOthers) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene = test::thicket_scene();
   const double before = work_per_ray(scene, 6.0).placements;
   for (const double distance : {1e6, 1e9, 1e15}) {
@@ -198,6 +202,7 @@ void add_floor(Mesh& mesh, float size) {
 }
 
 TEST(ExtremeScenes, HugeTrianglesDoNotMakeRaysTestAllSmallOnes) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const auto scene_with = [](float size, bool apart) {
     Scene scene;
     Mesh mesh = splinters(), floor;

@@ -14,6 +14,7 @@
 #include "tests/runtime/lod/own_cuts.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
+#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -247,6 +248,7 @@ double largest_distance_px(const GBuffer& seen, const SceneSource& other, const 
 }
 
 TEST_F(LodSourceTest, SurfacesStayWithinTheErrorInPixels) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   constexpr double kRounding = 1e-3; // in pixels: positions are floats
   const GBuffer whole = primary(baked_.source, PackedTracer(baked_.file, baked_.source), camera_);
   for (const double error_px : {0.05, 0.2, 2.0})

@@ -177,6 +177,7 @@ TEST(MovingInstances, OfLevelsOfDetailArePlacedAsInANewTracer) {
 }
 
 TEST(MovingInstances, GiveTheSameTreeForAnyNumberOfThreads) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const BakedScene baked(room_of(3000));
   const Movers movers = movers_from(kStill, baked.source, kRoom);
   std::vector<std::vector<RayHit>> results;

@@ -164,6 +164,7 @@ std::vector<Ray> rays_from_sides(const UnitSpace& space, const DAffine& world_fr
 }
 
 TEST(PackedLeaks, NoneFromBesideTheSidesOfACube) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   const size_t kRays = 50000 / kRayShare;
   constexpr int kCells = 8;
   const Mesh mesh = cube(1, kCells);
@@ -199,6 +200,7 @@ TEST(PackedLeaks, NoneFarFromTheOrigin) {
 }
 
 TEST(PackedLeaks, NoneBesideAHugeTriangle) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene; // The triangle is so large that pads of rays would be larger than leaf nodes.
   test::add_shape(scene, test::sphere({0.3, -0.2, 0.1}, 1, 50));
   Mesh huge;
@@ -210,6 +212,7 @@ TEST(PackedLeaks, NoneBesideAHugeTriangle) {
 }
 
 TEST(PackedLeaks, NoneThroughInstances) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   for (const DVec3 scale : {DVec3(1, 1, 1), DVec3(-3, 0.02, 1), DVec3(1e-6, 1e-6, 2e-6)}) {
     Scene scene;
     test::add_object(scene, test::sphere({0, 0, 0}, 1, 40));
@@ -228,6 +231,7 @@ TEST(PackedLeaks, NoneAtAnyScale) {
 }
 
 TEST(EmbreeClusterLeaks, NoRayLeavesAClosedMesh) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene;
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 50));
   EXPECT_EQ(leaks<EmbreeClusterTracer>(scene, {0.1, 0.2, -0.05}, kManyRays, chosen_isa()), 0u);
@@ -281,6 +285,7 @@ Mesh sphere_of_split_edges(bool slivers) {
 }
 
 TEST(PackedLeaks, NoneBesideSliversThatJoinALongEdgeToShortOnes) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   BakeConfig config;
   config.precision_kind = PrecisionKind::kAbsolute;
   config.precision = 1.0 / 1024.0;
@@ -295,6 +300,7 @@ TEST(PackedLeaks, NoneBesideSliversThatJoinALongEdgeToShortOnes) {
 }
 
 TEST(PackedLeaks, NoneAtAnyNumberOfPositionBits) {
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   Scene scene;
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 50));
   for (const int bits : {3, 5, 6, 8, 10, 12, 22, 25, 28}) {

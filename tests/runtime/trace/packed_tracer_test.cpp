@@ -105,6 +105,7 @@ TEST(PackedTracer, BeamsFindWhatTheirRaysFind) {
     for (const DVec3& from : {DVec3(0, 2, -7), DVec3(-2.5, 1, 0), DVec3(6, 3, 6)})
       for (const DVec3& towards : {DVec3(0, 0, 1), DVec3(-0.6, -0.2, -0.7), DVec3(0.5, -0.5, 0.5)})
         for (const double width : {0.05, 0.5, 3.0}) {
+          if (test::sanitized() && width != 0.5) continue;
           const std::vector<Ray> rays = cone(tracer.space(), from, towards, width);
           const std::vector<RayHit> together = closest(tracer, rays);
           std::vector<RayHit> alone(rays.size());
@@ -114,7 +115,7 @@ TEST(PackedTracer, BeamsFindWhatTheirRaysFind) {
           hits += static_cast<size_t>(
               std::count_if(alone.begin(), alone.end(), [](const RayHit& hit) { return hit.valid(); }));
         }
-    EXPECT_GT(hits, 30000u);
+    EXPECT_GT(hits, test::sanitized() ? 10000u : 30000u);
   }
 }
 
