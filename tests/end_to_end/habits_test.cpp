@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/end_to_end/workbench.h"
+#include "tests/sanitized.h"
 
 namespace packtrace::test {
 namespace {
@@ -208,6 +209,7 @@ TEST(Habits, NumbersThatAreNoneAreNamed) {
 }
 
 TEST(Habits, ThreadsMayBeSetForAllCommands) {
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const Workbench bench;
   const auto info = [&](const char* value, std::vector<std::string> more = {}) {
     more.insert(more.begin(), {"info", bench.scene()});

@@ -18,7 +18,6 @@
 #include "tests/compress/reader/reader_dump.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/pbrt_import/scene_folder.h"
-#include "tests/sanitized.h"
 
 namespace packtrace {
 namespace {
@@ -102,7 +101,6 @@ TEST_F(IndependentReader, DecodesMotion) {
 }
 
 TEST_P(IndependentReaderOfAssets, DecodesTheSame) {
-  if (test::sanitized()) GTEST_SKIP() << "the reader is a script, and other tests import and bake these scenes";
   const fs::path file = fs::path(PACKTRACE_SOURCE_DIR) / "assets" / GetParam();
   Diagnostics diagnostics;
   Progress progress;
