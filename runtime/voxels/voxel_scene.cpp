@@ -31,17 +31,25 @@ struct ProxyHit {
   DVec3 normal; ///< towards the ray's origin
 };
 
-std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction, double t_min, double t_max) {
+/// First t that counts of a ray in the units of a proxy's grid, and whether voxels count only behind an empty one.
+struct RayStart {
+  double t;
+  bool from_empty = false;
+};
+
+std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction, RayStart start, double t_max) {
   if (proxy.is_field()) {
     const double length = glm::length(direction);
     const FieldTracer tracer(proxy.field, (proxy.record.flags & voxels::kSigned) != 0);
-    const auto hit = tracer.first_hit(origin, direction / length, t_min * length, t_max * length);
+    const auto hit = tracer.first_hit(origin, direction / length, start.t * length, t_max * length);
     if (!hit) return std::nullopt;
     const double t = hit->t / length;
     if (!(t < t_max)) return std::nullopt;
     return ProxyHit{t, {}, DVec3(hit->normal)};
   }
-  const auto hit = VoxelTracer(proxy.voxels).first_hit(origin, direction, t_min, t_max);
+  const VoxelTracer tracer(proxy.voxels);
+  const auto hit = start.from_empty ? tracer.first_hit_from_empty(origin, direction, start.t, t_max)
+                                    : tracer.first_hit(origin, direction, start.t, t_max);
   if (!hit) return std::nullopt;
   DVec3 normal(0.0);
   const int axis = std::max(hit->axis, 0);
@@ -95,9 +103,9 @@ void VoxelScene::search(DVec3 origin, DVec3 direction, double t_min, double t_ma
     const Proxy& proxy = proxies_[placed.proxy];
     const DVec3 o = transform_point(placed.grid_from_world, origin),
                 d = transform_vector(placed.grid_from_world, direction);
-    const double first = begin(proxy, o, d);
-    if (!(first < limit)) return limit;
-    const auto hit = hit_of(proxy, o, d, first, limit);
+    const RayStart start = begin(proxy, o, d);
+    if (!(start.t < limit)) return limit;
+    const auto hit = hit_of(proxy, o, d, start, limit);
     return hit ? found(thing, *hit, limit) : limit;
   });
 }
@@ -106,7 +114,7 @@ std::optional<SceneVoxelHit> VoxelScene::first_hit(DVec3 origin, DVec3 direction
   std::optional<ProxyHit> best;
   uint32_t best_thing = 0;
   search(
-      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return t_min; },
+      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return RayStart{t_min}; },
       [&](uint32_t thing, const ProxyHit& hit, double limit) {
         if (best && !(hit.t < best->t || (hit.t == best->t && thing < best_thing))) return limit;
         best = hit, best_thing = thing;
@@ -140,7 +148,7 @@ std::optional<FieldVisibility> VoxelScene::field_visibility(const SceneVoxelHit&
 bool VoxelScene::occluded(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
   bool hit = false;
   search(
-      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return t_min; },
+      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return RayStart{t_min}; },
       [&](uint32_t, const ProxyHit&, double) {
         hit = true;
         return t_min;
@@ -154,7 +162,7 @@ double VoxelScene::first_distance(DVec3 origin, DVec3 direction, double t_min, d
     const VoxelIndex size = proxy.frame().size;
     bool inside = true;
     for (int a = 0; a < 3; ++a) inside &= o[a] > -kMargin && o[a] < size[static_cast<size_t>(a)] + kMargin;
-    return inside ? std::max(t_min, kDiagonal / glm::length(d)) : t_min;
+    return inside ? RayStart{std::max(t_min, kDiagonal / glm::length(d)), true} : RayStart{t_min};
   };
   double nearest = t_max;
   search(origin, direction, t_min, t_max, begin,

@@ -46,8 +46,9 @@ public:
   std::optional<SceneVoxelHit> first_hit(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
   bool occluded(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
 
-  /// For rays from surfaces that the voxels stand for: like first_hit(), but an instance's voxels do not count within a
-  /// voxel's diagonal of the origin if that lies in the instance's grid. Returns t, or t_max without a hit.
+  /// For rays from surfaces that the voxels stand for: like first_hit(), but if the origin lies in an instance's grid,
+  /// its voxels do not count within a voxel's diagonal of the origin, nor beyond it before the first empty voxel.
+  /// Returns t, or t_max without a hit.
   double first_distance(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
 
   /// Visibility of a hit of a distance field by taps along its normal and by cones; none for voxels.
@@ -70,8 +71,8 @@ private:
     glm::dmat3 world_normal; ///< normals of the grid to the world, not of unit length
   };
 
-  /// The way of all rays: `begin(proxy, origin, direction)` returns the first t that counts, of a ray in the units of a
-  /// proxy's grid; `found(placed, hit, t_max)` returns the new t_max, and the search ends once it is not above t_min.
+  /// The way of all rays: `begin(proxy, origin, direction)` returns the RayStart of a ray in the units of a proxy's
+  /// grid; `found(placed, hit, t_max)` returns the new t_max, and the search ends once it is not above t_min.
   template <class Begin, class Found>
   void search(DVec3 origin, DVec3 direction, double t_min, double t_max, const Begin& begin, const Found& found) const;
 

@@ -70,14 +70,18 @@ private:
   std::array<Node, voxels::kMaxLevels> node_; // by level, from 1 to depth_
 };
 
-template <class Real>
+/// @tparam kFromEmpty whether voxels count only behind an empty one
+template <class Real, bool kFromEmpty = false>
 [[gnu::always_inline]] inline std::optional<VoxelHit<Real>>
 trace(const OccupancyStream& stream, glm::vec<3, Real> origin, glm::vec<3, Real> direction, Real t_min, Real t_max) {
   VoxelWalk<Real> walk(origin, direction);
   if (!walk.enter(stream.size(), t_min, t_max)) return std::nullopt;
   NodePath path(stream);
+  bool counts = !kFromEmpty;
   for (uint32_t shift = 0;;) {
-    if (path.test(walk.voxel(), shift)) return VoxelHit<Real>{walk.t(), walk.voxel(), walk.axis()};
+    const bool set = path.test(walk.voxel(), shift);
+    if (set && counts) return VoxelHit<Real>{walk.t(), walk.voxel(), walk.axis()};
+    counts |= !set;
     if (!walk.leave_cell(shift, t_max)) return std::nullopt;
   }
 }
@@ -87,6 +91,11 @@ trace(const OccupancyStream& stream, glm::vec<3, Real> origin, glm::vec<3, Real>
 PACKTRACE_AVX2_CLONES std::optional<VoxelHit<double>> trace_double(const OccupancyStream& stream, glm::dvec3 origin,
                                                                    glm::dvec3 direction, double t_min, double t_max) {
   return trace<double>(stream, origin, direction, t_min, t_max);
+}
+
+PACKTRACE_AVX2_CLONES std::optional<VoxelHit<double>>
+trace_from_empty(const OccupancyStream& stream, glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) {
+  return trace<double, true>(stream, origin, direction, t_min, t_max);
 }
 
 PACKTRACE_AVX2_CLONES std::optional<VoxelHit<float>> trace_float(const OccupancyStream& stream, glm::vec3 origin,
@@ -104,6 +113,11 @@ std::optional<VoxelHit<double>> VoxelTracer::first_hit(glm::dvec3 origin, glm::d
 std::optional<VoxelHit<float>> VoxelTracer::first_hit(glm::vec3 origin, glm::vec3 direction, float t_min,
                                                       float t_max) const {
   return trace_float(*stream_, origin, direction, t_min, t_max);
+}
+
+std::optional<VoxelHit<double>> VoxelTracer::first_hit_from_empty(glm::dvec3 origin, glm::dvec3 direction, double t_min,
+                                                                  double t_max) const {
+  return trace_from_empty(*stream_, origin, direction, t_min, t_max);
 }
 
 bool VoxelTracer::occluded(glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) const {

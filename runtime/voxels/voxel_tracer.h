@@ -35,6 +35,11 @@ public:
   /// In floats, as shaders compute it.
   std::optional<VoxelHit<float>> first_hit(glm::vec3 origin, glm::vec3 direction, float t_min, float t_max) const;
 
+  /// Like first_hit(), but the set voxels before the first empty one do not count: a ray that starts on a surface
+  /// leaves the layer of voxels that stands for it.
+  std::optional<VoxelHit<double>> first_hit_from_empty(glm::dvec3 origin, glm::dvec3 direction, double t_min,
+                                                       double t_max) const;
+
   bool occluded(glm::dvec3 origin, glm::dvec3 direction, double t_min, double t_max) const;
 
   const OccupancyStream& stream() const { return *stream_; }

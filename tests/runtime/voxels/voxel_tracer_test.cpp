@@ -30,10 +30,17 @@ VoxelSet some_voxels(VoxelIndex size, uint32_t seed) {
   return set;
 }
 
+bool in_grid(const VoxelSet& set, const std::array<int64_t, 3>& v) {
+  for (size_t a = 0; a < 3; ++a)
+    if (v[a] < 0 || v[a] >= int64_t{set.size()[a]}) return false;
+  return true;
+}
+
 /// Crosses the planes of the dense grid one after another, in the order of (t, axis).
+/// @param counts whether voxels count before the first empty one
 template <class Real>
 std::optional<VoxelHit<Real>> dense_walk(const VoxelSet& set, glm::vec<3, Real> o, glm::vec<3, Real> d, Real t_min,
-                                         Real t_max) {
+                                         Real t_max, bool counts = true) {
   const glm::vec<3, Real> inverse = Real(1) / d;
   struct Crossing {
     Real t;
@@ -55,8 +62,11 @@ std::optional<VoxelHit<Real>> dense_walk(const VoxelSet& set, glm::vec<3, Real> 
     // The ray is in v from t to the next crossing.
     const Real next = i < crossings.size() ? crossings[i].t : std::numeric_limits<Real>::infinity();
     const bool later = next > t_min; // the voxel is left behind t_min
-    if (later && t < t_max && set.contains(v[0], v[1], v[2]))
-      return VoxelHit<Real>{t, {uint32_t(v[0]), uint32_t(v[1]), uint32_t(v[2])}, axis};
+    if (later && t < t_max && in_grid(set, v)) {
+      const bool occupied = set.contains(v[0], v[1], v[2]);
+      if (occupied && counts) return VoxelHit<Real>{t, {uint32_t(v[0]), uint32_t(v[1]), uint32_t(v[2])}, axis};
+      counts |= !occupied;
+    }
     if (i == crossings.size()) break;
     v[static_cast<size_t>(crossings[i].axis)] += crossings[i].step;
     if (next > t_min) t = next, axis = crossings[i].axis;
@@ -123,6 +133,31 @@ TEST(VoxelTracer, FindsTheVoxelOfADenseWalkForEveryRay) {
     options.full = true;
     compare_with_dense<double>(options);
     compare_with_dense<float>(options);
+  }
+}
+
+TEST(VoxelTracer, VoxelsBeforeTheFirstEmptyOneMayNotCount) {
+  const VoxelIndex size = {20, 20, 20};
+  const VoxelSet set = some_voxels(size, 4);
+  for (const bool full : {false, true}) {
+    OccupancyOptions options;
+    options.full = full;
+    const OccupancyStream stream = encode_occupancy(set, options);
+    const VoxelTracer tracer(stream);
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    uint64_t hits = 0, others = 0; // others: that first_hit() does not find
+    for (const TestRay& ray : test_rays(size, 20000)) {
+      const auto expected = dense_walk<double>(set, ray.o, ray.d, 0.0, kFar, false);
+      const auto got = tracer.first_hit_from_empty(ray.o, ray.d, 0.0, kFar);
+      ASSERT_EQ(got.has_value(), expected.has_value());
+      if (!got) continue;
+      ++hits;
+      ASSERT_EQ(got->voxel, expected->voxel);
+      ASSERT_EQ(got->t, expected->t);
+      others += got->t > tracer.first_hit(ray.o, ray.d, 0.0, kFar)->t ? 1 : 0;
+    }
+    EXPECT_GT(hits, 500u);
+    EXPECT_GT(others, 50u);
   }
 }
 
