@@ -114,7 +114,11 @@ std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& confi
   for (uint32_t g = 0; g < count; ++g) {
     progress.check_cancelled();
     progress.advance();
-    if ((instanced && world_space(g)) || runs[g].empty()) continue;
+    if (instanced && world_space(g)) continue;
+    if (runs[g].empty()) {
+      ++empty;
+      continue;
+    }
     const OccludingTriangles source = occluding_triangles(file, g, runs[g]);
     std::optional<Proxy> proxy = build_any(file, g, runs[g], config, budget, source);
     if (!proxy) {
