@@ -203,16 +203,7 @@ void convert_uvs(std::vector<float>& uvs, const MaterialUse& use) {
 std::optional<std::vector<int32_t>> lattice_of(Document& document, const Value& mesh, const Value& primitive,
                                                bool skinned) {
   if (skinned || primitive.find("targets")) return std::nullopt; // the positions leave it
-  constexpr const char* kLattice = "packtrace_lattice";
-  for (const Value& owner : {mesh, document.root().at("asset")}) {
-    const std::optional<Value> extras = owner.find("extras");
-    if (!extras || !extras->has(kLattice)) continue;
-    const std::vector<double> values = extras->at(kLattice).numbers(2);
-    constexpr double kLimit = 1e9; // beyond it the importer reports them
-    std::vector<int32_t> lattice;
-    for (const double value : values) lattice.push_back(static_cast<int32_t>(std::clamp(value, -kLimit, kLimit)));
-    return lattice;
-  }
+  if (std::optional<std::vector<int32_t>> stated = stated_lattice(document, mesh)) return stated;
   const std::optional<uint64_t> positions = primitive.at("attributes").find_integer("POSITION");
   if (!positions) return std::nullopt;
   const Value accessor = document.element("accessors", *positions);
@@ -223,6 +214,20 @@ std::optional<std::vector<int32_t>> lattice_of(Document& document, const Value& 
 }
 
 } // namespace
+
+std::optional<std::vector<int32_t>> stated_lattice(Document& document, const Value& mesh) {
+  constexpr const char* kLattice = "packtrace_lattice";
+  for (const Value& owner : {mesh, document.root().at("asset")}) {
+    const std::optional<Value> extras = owner.find("extras");
+    if (!extras || !extras->has(kLattice)) continue;
+    const std::vector<double> values = extras->at(kLattice).numbers(2);
+    constexpr double kLimit = 1e9; // beyond it the importer reports them
+    std::vector<int32_t> lattice;
+    for (const double value : values) lattice.push_back(static_cast<int32_t>(std::clamp(value, -kLimit, kLimit)));
+    return lattice;
+  }
+  return std::nullopt;
+}
 
 void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh_value, const Value& primitive,
                         const Pose& pose) {

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <vector>
+
 #include "pbrt_import/gltf/gltf_document.h"
 #include "pbrt_import/gltf/gltf_materials.h"
 #include "pbrt_import/gltf/gltf_pose.h"
@@ -11,5 +15,9 @@ namespace packtrace::gltf {
 /// Throws Error(kInput) if it is malformed; MemoryError.
 void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh, const Value& primitive,
                         const Pose& pose);
+
+/// Mantissa and exponent of the lattice that a mesh or its document states for the positions, as exports do. None if
+/// they state none. Throws Error(kInput) if the statement is malformed.
+std::optional<std::vector<int32_t>> stated_lattice(Document& document, const Value& mesh);
 
 } // namespace packtrace::gltf

@@ -48,8 +48,25 @@ void Reader::collect_meshes() {
   if (context_.options.frames_per_second) collect_frames(skins);
   std::vector<uint64_t> counts(is_object_.size(), 0);
   for (const MeshUse& use : uses_)
-    if (use.pose.empty()) counts[static_cast<size_t>(use.mesh)] += use.motion ? 2 : use.node_from_mesh.size();
+    if (use.pose.empty())
+      counts[static_cast<size_t>(use.mesh)] += use.motion || leaves_lattice(use) ? 2 : use.node_from_mesh.size();
   for (size_t i = 0; i < counts.size(); ++i) is_object_[i] = counts[i] > 1;
+}
+
+/// Whether a mesh that states its lattice would leave it as a shape of the world: the nodes turn it, scale it unevenly,
+/// or move it by other than whole steps.
+bool Reader::leaves_lattice(const MeshUse& use) {
+  std::optional<std::vector<int32_t>> lattice;
+  // A malformed statement is reported with the primitives.
+  const std::string ignored =
+      problem_of([&] { lattice = stated_lattice(*document_, document_->element("meshes", use.mesh)); });
+  if (!lattice || use.node_from_mesh.empty()) return false;
+  const DAffine map =
+      compose(compose(world_from_file_, nodes_[use.placed].world_from_node), use.node_from_mesh.front());
+  const double scale = map[0].x, step = std::ldexp(static_cast<double>((*lattice)[0]), (*lattice)[1]) * scale;
+  if (glm::dmat3(map) != glm::dmat3(scale) || !(scale > 0.0)) return true;
+  const DVec3 steps = map[3] / step;
+  return steps != glm::round(steps);
 }
 
 void Reader::collect_mesh(size_t placed, Skins& skins, PosedSkins& posed_skins) {

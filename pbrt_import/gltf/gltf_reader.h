@@ -47,6 +47,7 @@ private:
   };
   void add_camera(size_t placed, uint64_t camera);
   void collect_meshes();
+  bool leaves_lattice(const MeshUse& use);
   void collect_frames(Skins& skins);
   void collect_mesh(size_t placed, Skins& skins, PosedSkins& posed_skins);
   void add_objects(const Materials& materials);
@@ -67,7 +68,8 @@ private:
   std::vector<PlacedNode> posed_; ///< at the time of morphs and skins; empty: as nodes_
   NodeTracks tracks_;
   std::vector<MeshUse> uses_;
-  std::vector<uint8_t> is_object_; ///< by mesh: it moves or has several users that are not deformed
+  std::vector<uint8_t>
+      is_object_; ///< by mesh: it moves, has several users that are not deformed, or would leave its lattice
 };
 
 } // namespace packtrace::gltf

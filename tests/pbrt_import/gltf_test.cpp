@@ -187,6 +187,25 @@ TEST(GltfMaterials, ColoursMasksAndLight) {
   EXPECT_EQ(absent.statistics.shapes_absent, 1u);
 }
 
+/// Objects that a mesh with a stated lattice becomes in a node.
+size_t objects_on_lattice(const SceneFolder& folder, const Json& node, bool stated = true) {
+  GltfBuilder gltf = gltf_triangle(node);
+  if (stated) gltf.json["meshes"][0]["extras"] = {{"packtrace_lattice", {8, -4}}}; // steps of 1/2
+  return import_gltf(folder, gltf).scene.objects.size();
+}
+
+TEST(GltfNodes, MeshesStayOnTheLatticeThatTheyState) {
+  const SceneFolder folder;
+  const Json turned = {{"rotation", {0, 0.6, 0, 0.8}}};
+  EXPECT_EQ(objects_on_lattice(folder, turned), 1u);
+  EXPECT_EQ(objects_on_lattice(folder, turned, false), 0u);
+  EXPECT_EQ(objects_on_lattice(folder, {{"scale", {1, 2, 1}}}), 1u);
+  EXPECT_EQ(objects_on_lattice(folder, {{"translation", {0.25, 0, 0}}}), 1u);
+  // The files' x is mirrored, as the root node of exports mirrors it back.
+  EXPECT_EQ(objects_on_lattice(folder, {{"scale", {-1, 1, 1}}}), 0u);
+  EXPECT_EQ(objects_on_lattice(folder, {{"scale", {-2, 2, 2}}, {"translation", {3, 0, -1}}}), 0u);
+}
+
 TEST(GltfMaterials, IndexAndFactorGiveTheReflectance) {
   const SceneFolder folder;
   uint64_t problems = 0;
