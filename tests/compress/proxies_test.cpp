@@ -107,6 +107,17 @@ TEST(Proxies, GeometryThatOccludesNothingGetsNone) {
   EXPECT_TRUE(proxies_of(test::bake(Scene{}, proxy_config())).empty());
 }
 
+TEST(Proxies, GeometriesWithoutTrianglesAreSaid) {
+  Mesh point;
+  point.positions = {Vec3(1.0f), Vec3(1.0f), Vec3(1.0f)};
+  point.triangles = {Triangle(0, 1, 2)};
+  BakeConfig config;
+  config.proxy.use = ProxyUse::kVoxels;
+  const std::vector<std::string> warnings = test::bake(test::scene_of(point), config).report.warnings;
+  EXPECT_TRUE(std::ranges::any_of(
+      warnings, [](const std::string& warning) { return warning.find("gets no proxy") != std::string::npos; }));
+}
+
 TEST(Proxies, FlatGeometryHasOneLayerOfVoxels) {
   const Proxy proxy = proxies_of(test::bake(test::scene_of(test::grid_mesh(4)), proxy_config(16))).at(0);
   EXPECT_EQ(proxy.voxels.size(), (VoxelIndex{16, 16, 1}));
