@@ -57,10 +57,10 @@ void Reader::collect_meshes() {
 /// or move it by other than whole steps.
 bool Reader::leaves_lattice(const MeshUse& use) {
   std::optional<std::vector<int32_t>> lattice;
-  // A malformed statement is reported with the primitives.
-  const std::string ignored =
+  const std::string problem =
       problem_of([&] { lattice = stated_lattice(*document_, document_->element("meshes", use.mesh)); });
-  if (!lattice || use.node_from_mesh.empty()) return false;
+  // A malformed statement is reported with the primitives.
+  if (!problem.empty() || !lattice || use.node_from_mesh.empty()) return false;
   const DAffine map =
       compose(compose(world_from_file_, nodes_[use.placed].world_from_node), use.node_from_mesh.front());
   const double scale = map[0].x, step = std::ldexp(static_cast<double>((*lattice)[0]), (*lattice)[1]) * scale;
