@@ -125,6 +125,31 @@ TEST(ObjExport, FacesComeBack) {
   EXPECT_EQ(after, mirrored);
 }
 
+/// Readers multiply an image by the colour beside it.
+TEST(ObjExport, ColoursOfImagesComeBack) {
+  Scene scene = test::scene_of(test::grid_mesh(4));
+  scene.meshes[0].uvs.assign(scene.meshes[0].positions.size(), Vec2(0.5f));
+  AlbedoTexture texture;
+  texture.width = texture.height = 4;
+  texture.rgb.assign(3 * 4 * 4, 100); // an sRGB value
+  scene.textures.push_back(std::move(texture));
+  constexpr float kLinear = 0.127f;
+  scene.materials[0].albedo = Vec3(kLinear);
+  scene.materials[0].albedo_texture = 0;
+  scene.materials[0].flags |= kAlbedoTexture;
+  BakeConfig config;
+  config.purpose = baked::kShading;
+  config.textures = true;
+  const BakedScene baked = test::bake(scene, config);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(file.sections().textures.size(), 1u);
+  Progress progress;
+  const TemporaryFolder folder;
+  const Scene back = import_again(write(folder, whole_obj(file, "a", progress)));
+  ASSERT_EQ(back.materials.size(), 1u);
+  EXPECT_NEAR(back.materials[0].albedo.x, kLinear, 0.01f);
+}
+
 TEST(ObjExport, CompanionsAreKnownBefore) {
   Scene scene = test::mixed_scene();
   const BakedScene baked = test::bake(std::move(scene));

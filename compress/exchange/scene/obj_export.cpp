@@ -57,7 +57,9 @@ private:
     for (uint32_t i = 0; i < names_.size(); ++i) {
       const baked::MaterialRecord& record = file_.sections().materials[i];
       text += "newmtl " + names_[i] + "\n";
-      append_vector(text, "Kd ", std::span<const float>(record.albedo));
+      const std::array<float, 3> factor{1.0f, 1.0f, 1.0f}; // readers multiply the image by Kd
+      append_vector(text, "Kd ",
+                    std::span<const float>(record.albedo_texture != baked::kNone ? factor : record.albedo));
       if ((record.flags & (kMetal | kMirror)) != 0)
         text += (record.flags & kMirror) != 0 ? "Pm 1\nPr 0\n" : "Pm 1\nPr 0.5\n";
       if ((record.flags & kEmissive) != 0) text += "Ke 1 1 1\n";
