@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Compiles with clang what is written in compiler vectors, as the preset `fuzz` does and no other (docs/fuzzing.md).
 
-Usage: clang_compiles.py BUILD_DIRECTORY [all]      one whose compile_commands.json names GCC
-Checks syntax and types only, of what changed since main (on main itself: in its last commit), or of all. Exit codes: 0 all compile, 1 some do not, 77 there is no clang++-19.
+Usage: clang_compiles.py BUILD_DIRECTORY      one whose compile_commands.json names GCC
+Checks syntax and types only. Exit codes: 0 all compile, 1 some do not, 77 there is no clang++-19.
 """
 import json
 import os
@@ -19,25 +19,13 @@ VECTORS = re.compile(r"vector_size|__builtin_shuffle|immintrin\.h")
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
-def add_files(path, files):
-    """Adds the file and what it includes, directly or not, from this repository or the batch's list."""
-    if path in files or not path.is_file():
-        return
-    files.add(path)
-    for name in INCLUDE.findall(path.read_text()):
-        add_files(SOURCE / name, files)
-
-
-def changed_files():
-    """Paths that differ from main, as .ci/clang_tidy.sh chooses them; None outside a git checkout."""
-    def git(*words):
-        result = subprocess.run(["git", *words], cwd=SOURCE, capture_output=True, text=True)
-        return result.stdout.strip() if result.returncode == 0 else ""
-
-    base = git("merge-base", "HEAD", "origin/main") or git("merge-base", "HEAD", "main")
-    if not base or base == git("rev-parse", "HEAD"):
-        base = git("rev-parse", "-q", "--verify", "HEAD~1")
-    return {SOURCE / name for name in git("diff", "--name-only", base).splitlines()} if base else None
+def uses_vectors(path, seen):
+    """Whether the file, or one that it includes, mentions the compiler's vectors."""
+    if path in seen or not path.is_file():
+        return False
+    seen.add(path)
+    text = path.read_text()
+    return bool(VECTORS.search(text)) or any(uses_vectors(SOURCE / name, seen) for name in INCLUDE.findall(text))
 
 
 def clang_command(clang, command):
@@ -50,27 +38,19 @@ def clang_command(clang, command):
 
 
 def main():
-    if len(sys.argv) not in (2, 3) or sys.argv[2:] not in ([], ["all"]):
+    if len(sys.argv) != 2:
         sys.exit(__doc__)
     clang = shutil.which("clang++-19")
     if clang is None:
         print("skipped: there is no clang++-19")
         return 77
     entries = json.loads((pathlib.Path(sys.argv[1]) / "compile_commands.json").read_text())
-    changed = None if sys.argv[2:] else changed_files()
-    using, chosen = set(), {}
+    chosen = {}
     for entry in entries:
         path = pathlib.Path(entry["file"])
-        if "tests" in path.relative_to(SOURCE).parts or path in using:
-            continue
-        files = set()
-        add_files(path, files)
-        if not any(VECTORS.search(file.read_text()) for file in files):
-            continue
-        using.add(path)
-        if changed is None or files & changed:
-            chosen[path] = entry
-    if not using:
+        if "tests" not in path.relative_to(SOURCE).parts and uses_vectors(path, set()):
+            chosen.setdefault(path, entry)
+    if not chosen:
         print("no source uses vectors: the search for them is broken")
         return 1
 
@@ -83,7 +63,7 @@ def main():
         if result.returncode != 0:
             print(f"{path.relative_to(SOURCE)}: does not compile\n{result.stderr}")
     failed = sum(result.returncode != 0 for _, result in results)
-    print(f"{len(using)} sources use vectors, {len(results)} of them changed, {failed} do not compile with clang")
+    print(f"{len(results)} sources use vectors, {failed} do not compile with clang")
     return 1 if failed else 0
 
 
