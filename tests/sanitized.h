@@ -14,7 +14,7 @@ inline bool sanitized() {
 #endif
 }
 
-/// Why a test that takes long with sanitizers is skipped there.
+/// Reason for skipping a slow test in sanitized builds.
 inline constexpr const char* kOthersRunItsCode = "other tests run the same code under sanitizers in less time";
 
 /// Number of rays, repeats and the like for a test: an eighth of `count` with sanitizers.

@@ -16,8 +16,8 @@ namespace packtrace::gltf {
 void add_gltf_primitive(Document& document, const Materials& materials, const Value& mesh, const Value& primitive,
                         const Pose& pose);
 
-/// Mantissa and exponent of the lattice that a mesh or its document states for the positions, as exports do. None if
-/// they state none. Throws Error(kInput) if the statement is malformed.
+/// Mantissa and exponent of the position lattice in the `packtrace_lattice` extra of the mesh or, without one, of the
+/// asset. None if neither has the extra. Throws Error(kInput) if it is malformed.
 std::optional<std::vector<int32_t>> stated_lattice(Document& document, const Value& mesh);
 
 } // namespace packtrace::gltf

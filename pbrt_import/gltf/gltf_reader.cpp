@@ -48,18 +48,20 @@ void Reader::collect_meshes() {
   if (context_.options.frames_per_second) collect_frames(skins);
   std::vector<uint64_t> counts(is_object_.size(), 0);
   for (const MeshUse& use : uses_)
-    if (use.pose.empty())
-      counts[static_cast<size_t>(use.mesh)] += use.motion || leaves_lattice(use) ? 2 : use.node_from_mesh.size();
+    if (use.pose.empty()) counts[static_cast<size_t>(use.mesh)] += use.motion ? 2 : use.node_from_mesh.size();
   for (size_t i = 0; i < counts.size(); ++i) is_object_[i] = counts[i] > 1;
+  for (const MeshUse& use : uses_) // of meshes that are placed once
+    if (use.pose.empty() && counts[static_cast<size_t>(use.mesh)] == 1 && leaves_lattice(use))
+      is_object_[static_cast<size_t>(use.mesh)] = 1;
 }
 
-/// Whether a mesh that states its lattice would leave it as a shape of the world: the nodes turn it, scale it unevenly,
-/// or move it by other than whole steps.
+/// Whether the mesh states a lattice and its positions in world space do not lie on that lattice, because its node
+/// rotates it, scales it non-uniformly or negatively, or translates it by a fraction of a step.
 bool Reader::leaves_lattice(const MeshUse& use) {
   std::optional<std::vector<int32_t>> lattice;
   const std::string problem =
       problem_of([&] { lattice = stated_lattice(*document_, document_->element("meshes", use.mesh)); });
-  // A malformed statement is reported with the primitives.
+  // add_gltf_primitive() reports a malformed lattice.
   if (!problem.empty() || !lattice || use.node_from_mesh.empty()) return false;
   const DAffine map =
       compose(compose(world_from_file_, nodes_[use.placed].world_from_node), use.node_from_mesh.front());

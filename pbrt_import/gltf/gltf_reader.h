@@ -69,7 +69,7 @@ private:
   NodeTracks tracks_;
   std::vector<MeshUse> uses_;
   std::vector<uint8_t>
-      is_object_; ///< by mesh: it moves, has several users that are not deformed, or would leave its lattice
+      is_object_; ///< by mesh: becomes an object, because it moves, is placed several times or leaves its lattice
 };
 
 } // namespace packtrace::gltf

@@ -31,10 +31,10 @@ struct ProxyHit {
   DVec3 normal; ///< towards the ray's origin
 };
 
-/// First t that counts of a ray in the units of a proxy's grid, and whether voxels count only behind an empty one.
+/// Where a ray in the grid space of a proxy may begin to hit.
 struct RayStart {
-  double t;
-  bool from_empty = false;
+  double t;                ///< smallest ray parameter of a hit
+  bool from_empty = false; ///< ignore voxels before the first empty one (VoxelTracer::first_hit_from_empty)
 };
 
 std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction, RayStart start, double t_max) {

@@ -46,9 +46,9 @@ public:
   std::optional<SceneVoxelHit> first_hit(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
   bool occluded(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
 
-  /// For rays from surfaces that the voxels stand for: like first_hit(), but if the origin lies in an instance's grid,
-  /// its voxels do not count within a voxel's diagonal of the origin, nor beyond it before the first empty voxel.
-  /// Returns t, or t_max without a hit.
+  /// Like first_hit(), for rays that start on the surfaces of the source triangles. If the origin lies in the grid of
+  /// an instance, the ray ignores the instance's voxels up to one voxel diagonal from the origin, and from there up to
+  /// the first empty voxel. Returns the ray parameter of the hit, or t_max if there is none.
   double first_distance(DVec3 origin, DVec3 direction, double t_min, double t_max) const;
 
   /// Visibility of a hit of a distance field by taps along its normal and by cones; none for voxels.
@@ -71,8 +71,9 @@ private:
     glm::dmat3 world_normal; ///< normals of the grid to the world, not of unit length
   };
 
-  /// The way of all rays: `begin(proxy, origin, direction)` returns the RayStart of a ray in the units of a proxy's
-  /// grid; `found(placed, hit, t_max)` returns the new t_max, and the search ends once it is not above t_min.
+  /// Traces one ray through all instances. `begin(proxy, origin, direction)` gets the ray in the grid space of a proxy
+  /// and returns its RayStart. `found(placed, hit, t_max)` returns the new t_max; the search ends once that is at most
+  /// t_min.
   template <class Begin, class Found>
   void search(DVec3 origin, DVec3 direction, double t_min, double t_max, const Begin& begin, const Found& found) const;
 

@@ -70,7 +70,7 @@ private:
   std::array<Node, voxels::kMaxLevels> node_; // by level, from 1 to depth_
 };
 
-/// @tparam kFromEmpty whether voxels count only behind an empty one
+/// @tparam kFromEmpty ignore voxels before the first empty one
 template <class Real, bool kFromEmpty = false>
 [[gnu::always_inline]] inline std::optional<VoxelHit<Real>>
 trace(const OccupancyStream& stream, glm::vec<3, Real> origin, glm::vec<3, Real> direction, Real t_min, Real t_max) {

@@ -35,8 +35,8 @@ public:
   /// In floats, as shaders compute it.
   std::optional<VoxelHit<float>> first_hit(glm::vec3 origin, glm::vec3 direction, float t_min, float t_max) const;
 
-  /// Like first_hit(), but the set voxels before the first empty one do not count: a ray that starts on a surface
-  /// leaves the layer of voxels that stands for it.
+  /// Like first_hit(), but ignores occupied voxels before the first empty one. A ray that starts on a surface thus
+  /// passes the voxels that contain this surface.
   std::optional<VoxelHit<double>> first_hit_from_empty(glm::dvec3 origin, glm::dvec3 direction, double t_min,
                                                        double t_max) const;
 

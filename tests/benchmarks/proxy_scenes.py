@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scenes of many equal instances, to see where voxels make occlusion rays faster, as a table in Markdown.
+"""Measures where voxel proxies make occlusion rays faster, in scenes of many equal instances. Prints a Markdown table.
 
     tests/benchmarks/proxy_scenes.py build/release/bin/packtrace FOLDER [SHAPE ...] > table.md
 
@@ -18,8 +18,6 @@ import statistics
 import struct
 import subprocess
 import sys
-
-EXTENT = 2.0  # of a shape along its longest side, about
 
 
 class Mesh:
@@ -170,7 +168,7 @@ class Runner:
         self.program, self.folder, self.options = options.program, options.folder, options
 
     def call(self, *arguments):
-        """CPU seconds of the program."""
+        """Runs the program and returns its CPU seconds."""
         log = self.folder / "log.txt"
         with open(log, "w") as f:
             process = subprocess.Popen([self.program, *map(str, arguments), "--force", "-q"], stdout=f, stderr=f)

@@ -125,7 +125,7 @@ TEST(ObjExport, FacesComeBack) {
   EXPECT_EQ(after, mirrored);
 }
 
-/// Readers multiply an image by the colour beside it.
+/// Readers multiply the texture (map_Kd) by the diffuse colour (Kd).
 TEST(ObjExport, ColoursOfImagesComeBack) {
   Scene scene = test::scene_of(test::grid_mesh(4));
   scene.meshes[0].uvs.assign(scene.meshes[0].positions.size(), Vec2(0.5f));

@@ -231,7 +231,7 @@ std::string balls_on_a_floor() {
 }
 
 TEST(CommandLine, TheDefaultPrecisionKeepsThePicture) {
-  if (sanitized()) GTEST_SKIP() << "other tests run the same code under sanitizers with smaller scenes";
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const Workbench bench;
   const std::string scene = bench / "balls.pbrt", file = bench / "balls.ptk";
   write_text(scene, balls_on_a_floor());

@@ -123,7 +123,7 @@ TEST(Limits, ComparedImagesAskForMemoryToo) {
       0);
   for (const std::string& image : {png, exr}) {
     ASSERT_TRUE(fs::exists(image)) << image;
-    if (!sanitized()) { // takes long
+    if (!sanitized()) { // slow
       EXPECT_EQ(run_packtrace({"compare", image, image, "--max-memory", "64M"}).exit_code, 0);
     }
     const CommandResult large = run_packtrace({"compare", image, image, "--max-memory", "2M"});

@@ -159,7 +159,7 @@ TEST(Measure, ComparesTheWorldAndTimeThatWereBaked) {
 }
 
 TEST(Target, WritesTheSmallestFileThatKeepsTheLimitOrNone) {
-  if (sanitized()) GTEST_SKIP() << "other tests run the same code under sanitizers with smaller scenes";
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const Workbench bench;
   const std::string out = bench / "a.ptk";
   const CommandResult found =

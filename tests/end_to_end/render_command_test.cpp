@@ -70,7 +70,7 @@ TEST(CommandLine, DetailIsChosenByItsErrorInPixels) {
 
 /// The town's houses stand on its ground, each on a grid of its own, so seams may open.
 TEST(CommandLine, SeamsOfInstancesAreStatedAndSaidWhereTheyShow) {
-  if (sanitized()) GTEST_SKIP() << "other tests run the same code under sanitizers with smaller scenes";
+  if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const TemporaryFolder folder;
   const std::string file = folder / "town.ptk", json = folder / "x.json";
   const std::string scene = std::string(PACKTRACE_SOURCE_DIR) + "/assets/town/town.pbrt";

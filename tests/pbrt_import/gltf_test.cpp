@@ -187,7 +187,7 @@ TEST(GltfMaterials, ColoursMasksAndLight) {
   EXPECT_EQ(absent.statistics.shapes_absent, 1u);
 }
 
-/// Objects that a mesh with a stated lattice becomes in a node.
+/// Imports a triangle below `node` and returns the number of objects; `stated`: the mesh states its lattice.
 size_t objects_on_lattice(const SceneFolder& folder, const Json& node, bool stated = true) {
   GltfBuilder gltf = gltf_triangle(node);
   if (stated) gltf.json["meshes"][0]["extras"] = {{"packtrace_lattice", {8, -4}}}; // steps of 1/2
@@ -201,7 +201,7 @@ TEST(GltfNodes, MeshesStayOnTheLatticeThatTheyState) {
   EXPECT_EQ(objects_on_lattice(folder, turned, false), 0u);
   EXPECT_EQ(objects_on_lattice(folder, {{"scale", {1, 2, 1}}}), 1u);
   EXPECT_EQ(objects_on_lattice(folder, {{"translation", {0.25, 0, 0}}}), 1u);
-  // The files' x is mirrored, as the root node of exports mirrors it back.
+  // The import mirrors x, so a scale of -1 in x gives the identity. Exports write such a root node.
   EXPECT_EQ(objects_on_lattice(folder, {{"scale", {-1, 1, 1}}}), 0u);
   EXPECT_EQ(objects_on_lattice(folder, {{"scale", {-2, 2, 2}}, {"translation", {3, 0, -1}}}), 0u);
 }

@@ -115,10 +115,6 @@ std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& confi
     progress.check_cancelled();
     progress.advance();
     if (instanced && world_space(g)) continue;
-    if (runs[g].empty()) {
-      ++empty;
-      continue;
-    }
     const OccludingTriangles source = occluding_triangles(file, g, runs[g]);
     std::optional<Proxy> proxy = build_any(file, g, runs[g], config, budget, source);
     if (!proxy) {

@@ -57,7 +57,7 @@ private:
     for (uint32_t i = 0; i < names_.size(); ++i) {
       const baked::MaterialRecord& record = file_.sections().materials[i];
       text += "newmtl " + names_[i] + "\n";
-      const std::array<float, 3> factor{1.0f, 1.0f, 1.0f}; // readers multiply the image by Kd
+      constexpr std::array<float, 3> factor{1.0f, 1.0f, 1.0f}; // readers multiply the texture by Kd
       append_vector(text, "Kd ",
                     std::span<const float>(record.albedo_texture != baked::kNone ? factor : record.albedo));
       if ((record.flags & (kMetal | kMirror)) != 0)

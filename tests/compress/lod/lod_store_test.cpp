@@ -214,7 +214,6 @@ TEST(LodStore, AnInterruptedBakeLeavesNoHalfMadeLevels) {
   config.resume = folder.path() / "levels";
   uint64_t resumed = 0;
   for (const uint64_t stop : {1u, 20u, 40u, 60u, 80u}) {
-    if (sanitized() && stop % 40 != 0) continue;
     Diagnostics diagnostics;
     Progress progress([&](std::string_view phase, uint64_t done, uint64_t total) {
       if (phase.ends_with("levels") && 100 * done >= stop * total) throw Error(ErrorKind::kCancelled, "stopped");

@@ -88,7 +88,7 @@ std::vector<size_t> still_pixels(const GBuffer& g, uint32_t box) {
 }
 
 TEST_F(OccluderTest, LeavesLittleOcclusionBehind) {
-  if (test::sanitized()) GTEST_SKIP() << "other tests run the same code under sanitizers with fewer rays";
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   GBuffer g;
   AoFrame truth_before, truth, noisy;
   trace(1000, 256, kLow, kLow, g, truth_before);
@@ -134,7 +134,7 @@ struct SlidingErrors {
 };
 
 TEST_F(OccluderTest, MovesOnWithItsOcclusion) {
-  if (test::sanitized()) GTEST_SKIP() << "other tests run the same code under sanitizers with fewer rays";
+  if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
   GBuffer g;
   AoFrame truth, noisy;
   constexpr uint32_t kStart = 24, kFirst = 40, kEnd = 48;

@@ -37,7 +37,7 @@ bool in_grid(const VoxelSet& set, const std::array<int64_t, 3>& v) {
 }
 
 /// Crosses the planes of the dense grid one after another, in the order of (t, axis).
-/// @param counts whether voxels count before the first empty one
+/// @param counts whether voxels before the first empty one can be hit
 template <class Real>
 std::optional<VoxelHit<Real>> dense_walk(const VoxelSet& set, glm::vec<3, Real> o, glm::vec<3, Real> d, Real t_min,
                                          Real t_max, bool counts = true) {
@@ -145,7 +145,7 @@ TEST(VoxelTracer, VoxelsBeforeTheFirstEmptyOneMayNotCount) {
     const OccupancyStream stream = encode_occupancy(set, options);
     const VoxelTracer tracer(stream);
     constexpr double kFar = std::numeric_limits<double>::infinity();
-    uint64_t hits = 0, others = 0; // others: that first_hit() does not find
+    uint64_t hits = 0, later = 0; // later: behind the hit of first_hit()
     for (const TestRay& ray : test_rays(size, 20000)) {
       const auto expected = dense_walk<double>(set, ray.o, ray.d, 0.0, kFar, false);
       const auto got = tracer.first_hit_from_empty(ray.o, ray.d, 0.0, kFar);
@@ -154,10 +154,10 @@ TEST(VoxelTracer, VoxelsBeforeTheFirstEmptyOneMayNotCount) {
       ++hits;
       ASSERT_EQ(got->voxel, expected->voxel);
       ASSERT_EQ(got->t, expected->t);
-      others += got->t > tracer.first_hit(ray.o, ray.d, 0.0, kFar)->t ? 1 : 0;
+      later += got->t > tracer.first_hit(ray.o, ray.d, 0.0, kFar)->t ? 1 : 0;
     }
     EXPECT_GT(hits, 500u);
-    EXPECT_GT(others, 50u);
+    EXPECT_GT(later, 50u);
   }
 }
 
