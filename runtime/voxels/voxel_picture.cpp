@@ -45,12 +45,12 @@ public:
       const auto hit = scene_.first_hit(ray.origin, ray.direction, 0.0, std::numeric_limits<double>::infinity());
       if (!hit) continue;
       const uint32_t pixel = y * size_.width + x;
-      const DVec3 origin = ray.origin + hit->t * ray.direction + hit->clearance * hit->edge * hit->normal;
-      const float visibility = visibility_at(*hit, origin, view, pixel);
+      const DVec3 point = ray.origin + hit->t * ray.direction;
+      const float visibility = visibility_at(*hit, point, view, pixel);
       row_rays_[y] += config_.samples;
       picture_.color[pixel] += hit->albedo * visibility;
       picture_.coverage[pixel] += 1.0f;
-      if (const auto field = scene_.field_visibility(*hit, origin, config_.radius)) {
+      if (const auto field = scene_.field_visibility(*hit, point + hit->clearance, config_.radius)) {
         FieldSums& sums = fields_[pixel];
         ++sums.hits;
         sums.visibility += visibility, sums.taps += field->taps, sums.cones += field->cones;
@@ -81,12 +81,12 @@ private:
   }
 
   /// Share of the occlusion rays that reach the radius.
-  float visibility_at(const SceneVoxelHit& hit, DVec3 origin, uint32_t view, uint32_t pixel) const {
+  float visibility_at(const SceneVoxelHit& hit, DVec3 point, uint32_t view, uint32_t pixel) const {
     uint32_t open = 0;
     for (uint32_t s = 0; s < config_.samples; ++s) {
-      const Vec2 point = sample_point(view * config_.samples + s, pixel ^ hash32(config_.seed));
-      open +=
-          !scene_.occluded(origin, DVec3(turned_to(Vec3(hit.normal), cosine_direction(point))), 0.0, config_.radius);
+      const Vec2 sample = sample_point(view * config_.samples + s, pixel ^ hash32(config_.seed));
+      const DVec3 direction(turned_to(Vec3(hit.normal), cosine_direction(sample)));
+      open += !scene_.occluded_from(hit, point, direction, config_.radius);
     }
     return static_cast<float>(open) / static_cast<float>(config_.samples);
   }

@@ -37,6 +37,13 @@ struct RayStart {
   bool from_empty = false; ///< ignore voxels before the first empty one (VoxelTracer::first_hit_from_empty)
 };
 
+/// How far outside a proxy's surface rays start that leave it, in voxels. Unsigned distances do not lead out of the
+/// surface before about 1.5 voxels, 0.6 of which lie between the source and the surface that rays meet.
+double clearance_of(const Proxy& proxy) {
+  if (!proxy.is_field()) return 1e-3;
+  return (proxy.record.flags & voxels::kSigned) != 0 ? 0.3 : 0.9;
+}
+
 std::optional<ProxyHit> hit_of(const Proxy& proxy, DVec3 origin, DVec3 direction, RayStart start, double t_max) {
   if (proxy.is_field()) {
     const double length = glm::length(direction);
@@ -101,9 +108,9 @@ void VoxelScene::search(DVec3 origin, DVec3 direction, double t_min, double t_ma
   tree_.visit(origin, direction, t_min, t_max, [&](uint32_t thing, double limit) {
     const Placed& placed = placed_[thing];
     const Proxy& proxy = proxies_[placed.proxy];
-    const DVec3 o = transform_point(placed.grid_from_world, origin),
-                d = transform_vector(placed.grid_from_world, direction);
-    const RayStart start = begin(proxy, o, d);
+    DVec3 o = transform_point(placed.grid_from_world, origin);
+    const DVec3 d = transform_vector(placed.grid_from_world, direction);
+    const RayStart start = begin(thing, o, d);
     if (!(start.t < limit)) return limit;
     const auto hit = hit_of(proxy, o, d, start, limit);
     return hit ? found(thing, *hit, limit) : limit;
@@ -114,7 +121,7 @@ std::optional<SceneVoxelHit> VoxelScene::first_hit(DVec3 origin, DVec3 direction
   std::optional<ProxyHit> best;
   uint32_t best_thing = 0;
   search(
-      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return RayStart{t_min}; },
+      origin, direction, t_min, t_max, [&](uint32_t, DVec3&, DVec3) { return RayStart{t_min}; },
       [&](uint32_t thing, const ProxyHit& hit, double limit) {
         if (best && !(hit.t < best->t || (hit.t == best->t && thing < best_thing))) return limit;
         best = hit, best_thing = thing;
@@ -125,7 +132,7 @@ std::optional<SceneVoxelHit> VoxelScene::first_hit(DVec3 origin, DVec3 direction
   const Proxy& proxy = proxies_[from.proxy];
   SceneVoxelHit result;
   result.t = best->t, result.instance = from.instance, result.voxel = best->voxel, result.placed = best_thing;
-  if (proxy.is_field()) result.clearance = (proxy.record.flags & voxels::kSigned) != 0 ? 0.3 : 0.9;
+  result.clearance = glm::inverse(glm::dmat3(from.grid_from_world)) * (clearance_of(proxy) * best->normal);
   result.normal = glm::normalize(from.world_normal * best->normal);
   result.edge = 1.0 / glm::length(glm::transpose(glm::dmat3(from.grid_from_world)) * best->normal);
   if (!proxy.palette.empty()) result.albedo = linear_color(proxy.palette[proxy.voxels.swatch(best->voxel)]);
@@ -148,7 +155,7 @@ std::optional<FieldVisibility> VoxelScene::field_visibility(const SceneVoxelHit&
 bool VoxelScene::occluded(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
   bool hit = false;
   search(
-      origin, direction, t_min, t_max, [&](const Proxy&, DVec3, DVec3) { return RayStart{t_min}; },
+      origin, direction, t_min, t_max, [&](uint32_t, DVec3&, DVec3) { return RayStart{t_min}; },
       [&](uint32_t, const ProxyHit&, double) {
         hit = true;
         return t_min;
@@ -156,10 +163,25 @@ bool VoxelScene::occluded(DVec3 origin, DVec3 direction, double t_min, double t_
   return hit;
 }
 
+bool VoxelScene::occluded_from(const SceneVoxelHit& hit, DVec3 point, DVec3 direction, double t_max) const {
+  const auto begin = [&](uint32_t thing, DVec3& o, DVec3) {
+    DVec3 way = transform_vector(placed_[thing].grid_from_world, hit.clearance);
+    if (thing != hit.placed) way *= std::min(1.0, clearance_of(proxies_[placed_[thing].proxy]) / glm::length(way));
+    o += way;
+    return RayStart{0.0};
+  };
+  bool occluded = false;
+  search(point, direction, 0.0, t_max, begin, [&](uint32_t, const ProxyHit&, double) {
+    occluded = true;
+    return 0.0;
+  });
+  return occluded;
+}
+
 double VoxelScene::first_distance(DVec3 origin, DVec3 direction, double t_min, double t_max) const {
   constexpr double kDiagonal = 1.7320508075688772, kMargin = 1.0; // voxels
-  const auto begin = [&](const Proxy& proxy, DVec3 o, DVec3 d) {
-    const VoxelIndex size = proxy.frame().size;
+  const auto begin = [&](uint32_t thing, DVec3& o, DVec3 d) {
+    const VoxelIndex size = proxies_[placed_[thing].proxy].frame().size;
     bool inside = true;
     for (int a = 0; a < 3; ++a) inside &= o[a] > -kMargin && o[a] < size[static_cast<size_t>(a)] + kMargin;
     return inside ? RayStart{std::max(t_min, kDiagonal / glm::length(d)), true} : RayStart{t_min};
