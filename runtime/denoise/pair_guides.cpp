@@ -3,6 +3,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include "runtime/denoise/depth_derivatives.h"
+#include "runtime/denoise/simd.h"
 
 namespace packtrace {
 namespace {
@@ -22,14 +23,22 @@ private:
   std::vector<T> data_;
 };
 
+/// Computes the last two of SurfaceRow::rise from the first two.
+PACKTRACE_AVX2_CLONES
+void derive_diagonals(int width, const std::array<float*, 4>& rise) {
+  const float *right = rise[0], *down = rise[1];
+  float *down_right = rise[2], *down_left = rise[3];
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) down_right[x] = right[x] + down[x], down_left[x] = down[x] - right[x];
+}
+
 /// Guide weights of consecutive rows, as one thread computes them.
 class GuideRows {
 public:
   GuideRows(const Guides& guides, const GuideTerms& terms, const FilterKernels& kernels)
       : guides_(guides), terms_(terms), kernels_(kernels), width_(static_cast<int>(guides.size.width)),
-        height_(static_cast<int>(guides.size.height)), dx_(guides.size.width), dy_(guides.size.width),
-        lone_(guides.size.width), near_{KeptRows<uint8_t>(guides.size.width), KeptRows<uint8_t>(guides.size.width),
-                                        KeptRows<uint8_t>(guides.size.width), KeptRows<uint8_t>(guides.size.width)} {}
+        height_(static_cast<int>(guides.size.height)), rise_(four<float>(guides.size.width)), lone_(guides.size.width),
+        near_(four<uint8_t>(guides.size.width)), far_(four<uint8_t>(guides.size.width)) {}
 
   /// Starts anew at row y.
   void begin(int y) { next_derived_ = next_near_ = std::max(y - 1, 0), next_lone_ = y; }
@@ -38,35 +47,47 @@ public:
   void write(int y, size_t step_index, const std::array<uint8_t*, 4>& weights) {
     const int step = PairGuides::kSteps[step_index];
     for (; next_lone_ <= std::min(y + PairGuides::kSteps.back(), height_ - 1); ++next_lone_) find_lone(next_lone_);
-    if (step == 1)
-      for (size_t d = 0; d < weights.size(); ++d) std::copy_n(near_[d].row(y), width_, weights[d]);
-    else
-      kernels_.guide(width_, step, surface(y), surface(y + step), terms_, weights);
-    kernels_.raise_guides(width_, step, lone_.row(y), y + step < height_ ? lone_.row(y + step) : lone_.zeros(),
-                          weights);
+    auto& unraised = step == 1 ? near_ : far_;
+    if (step != 1) kernels_.guide(width_, step, surface(y), surface(y + step), terms_, rows_of(unraised, y));
+    kernels_.raise_guides(width_, step, pairs(unraised, y), lone_.row(y),
+                          y + step < height_ ? lone_.row(y + step) : lone_.zeros(), weights);
   }
 
 private:
+  template <typename T>
+  using Four = std::array<KeptRows<T>, 4>;
+  template <typename T>
+  static Four<T> four(uint32_t width) {
+    return {KeptRows<T>(width), KeptRows<T>(width), KeptRows<T>(width), KeptRows<T>(width)};
+  }
+  template <typename T>
+  static std::array<T*, 4> rows_of(Four<T>& rings, int y) {
+    return {rings[0].row(y), rings[1].row(y), rings[2].row(y), rings[3].row(y)};
+  }
+
   SurfaceRow surface(int y) {
-    return {guides_.disparity.row(y), dx_.row(y), dy_.row(y), guides_.normal_x.row(y), guides_.normal_y.row(y),
+    return {guides_.disparity.row(y),
+            {rise_[0].row(y), rise_[1].row(y), rise_[2].row(y), rise_[3].row(y)},
+            guides_.normal_x.row(y),
+            guides_.normal_y.row(y),
             guides_.normal_z.row(y)};
+  }
+
+  static PairRow pairs(Four<uint8_t>& rings, int y) {
+    PairRow rows;
+    for (size_t d = 0; d < rows.size(); ++d) rows[d] = y >= 0 ? rings[d].row(y) : rings[d].zeros();
+    return rows;
   }
 
   void find_lone(int y) {
     for (; next_near_ <= y; ++next_near_) {
       for (; next_derived_ <= std::min(next_near_ + 1, height_ - 1); ++next_derived_)
         derive_row(width_, guides_.disparity.row(next_derived_ - 1), guides_.disparity.row(next_derived_),
-                   guides_.disparity.row(next_derived_ + 1), dx_.row(next_derived_), dy_.row(next_derived_));
-      kernels_.guide(
-          width_, 1, surface(next_near_), surface(next_near_ + 1), terms_,
-          {near_[0].row(next_near_), near_[1].row(next_near_), near_[2].row(next_near_), near_[3].row(next_near_)});
+                   guides_.disparity.row(next_derived_ + 1), rise_[0].row(next_derived_), rise_[1].row(next_derived_)),
+            derive_diagonals(width_, rows_of(rise_, next_derived_));
+      kernels_.guide(width_, 1, surface(next_near_), surface(next_near_ + 1), terms_, rows_of(near_, next_near_));
     }
-    const auto pairs = [&](int row) {
-      PairRow rows;
-      for (size_t d = 0; d < rows.size(); ++d) rows[d] = row >= 0 ? near_[d].row(row) : near_[d].zeros();
-      return rows;
-    };
-    kernels_.lone_guide(width_, pairs(y), pairs(y - 1), guides_.disparity.row(y), lone_.row(y));
+    kernels_.lone_guide(width_, pairs(near_, y), pairs(near_, y - 1), guides_.disparity.row(y), lone_.row(y));
   }
 
   const Guides& guides_;
@@ -74,9 +95,9 @@ private:
   const FilterKernels& kernels_;
   int width_, height_;
   int next_derived_ = 0, next_near_ = 0, next_lone_ = 0;
-  KeptRows<float> dx_, dy_; ///< derivatives of the disparity
+  Four<float> rise_; ///< of the disparity
   KeptRows<uint8_t> lone_;
-  std::array<KeptRows<uint8_t>, 4> near_; ///< weights of the pairs one pixel apart, not raised
+  Four<uint8_t> near_, far_; ///< weights of the pairs one pixel apart, and of those farther apart, not raised
 };
 
 } // namespace

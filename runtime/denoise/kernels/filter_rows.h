@@ -38,7 +38,8 @@ inline constexpr uint16_t kMostDeviations = 240;
 
 /// What guide weights compare, for one row of pixels.
 struct SurfaceRow {
-  const float *disparity, *dx, *dy; ///< dx, dy: change of the disparity per pixel
+  const float* disparity;
+  std::array<const float*, 4> rise; ///< change of the disparity along each of kPairOffsets
   const int16_t *nx, *ny, *nz;      ///< in kNormalUnit
 };
 
@@ -137,15 +138,16 @@ struct VarianceTerms {
 struct FilterKernels {
   /// Guide weights of the pairs that begin in a row: kMinGuide to 255 where both pixels hit, 0 where one does not.
   /// @param below the row one step below
+  /// @param weights followed by kRowPadding pixels, into which zeros may be written
   void (*guide)(int width, int step, const SurfaceRow& here, const SurfaceRow& below, const GuideTerms& terms,
                 const std::array<uint8_t*, 4>& weights);
   /// How alone the pixels of a row are, from the guide weights of the pairs one pixel apart that begin in it and in the
   /// row above: 0 to kLoneGuide. 0 for pixels that missed.
   void (*lone_guide)(int width, const PairRow& here, const PairRow& above, const float* disparity, uint8_t* lone);
   /// Raises the guide weights of the pairs that begin in a row to the lesser lone_guide() of both pixels.
-  /// @param below the row one step below
-  void (*raise_guides)(int width, int step, const uint8_t* here, const uint8_t* below,
-                       const std::array<uint8_t*, 4>& weights);
+  /// @param here, below lone_guide() of the row and of that one step below
+  void (*raise_guides)(int width, int step, const PairRow& weights, const uint8_t* here, const uint8_t* below,
+                       const std::array<uint8_t*, 4>& raised);
   /// Distances d of the pairs that begin in a row, plus 1 / noise_tolerance; kNoDistance where a pixel missed.
   /// @param below the row one step below
   /// @param no_distance PatchTerms::no_distance

@@ -18,39 +18,52 @@ inline float reciprocal_root(float x) {
   return r * (1.5f - 0.5f * x * r * r);
 }
 
-/// Guide weight of the surfaces at two pixels of rows, q being at an offset from p.
-inline uint8_t guide_weight(const SurfaceRow& p, int at_p, const SurfaceRow& q, int at_q, float offset_x,
-                            float offset_y, const GuideTerms& t) {
-  const float difference = q.disparity[at_q] - p.disparity[at_p];
-  const float rise_p = p.dx[at_p] * offset_x + p.dy[at_p] * offset_y;
-  const float rise_q = q.dx[at_q] * offset_x + q.dy[at_q] * offset_y;
-  const float distance = greater(std::abs(difference - rise_p), std::abs(difference - rise_q));
-  const float least = t.depth * lesser(p.disparity[at_p], q.disparity[at_q]);
+/// The surfaces at some pixels.
+struct Surfaces {
+  F32 disparity;
+  I32 nx, ny, nz;
+};
+
+inline Surfaces load(const SurfaceRow& row, int at) {
+  return {load(row.disparity + at), load_wide(row.nx + at), load_wide(row.ny + at), load_wide(row.nz + at)};
+}
+
+/// Guide weights of pairs of pixels in one direction. All lengths are divided by the number of pixels that they are
+/// apart, a power of two, which changes no rounding.
+/// @param scale 1 / that number
+inline I32 guide_weights(const Surfaces& p, F32 rise_p, const Surfaces& q, F32 rise_q, float scale,
+                         const GuideTerms& t) {
+  const F32 difference = (q.disparity - p.disparity) * scale;
+  const F32 distance = greater(magnitude(difference - rise_p), magnitude(difference - rise_q));
+  const F32 nearer = lesser(p.disparity, q.disparity), least = nearer * (t.depth * scale);
   // The flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette. There, their
   // difference says nothing of a curvature, so it counts up to a limit.
-  const float allowed = least + t.slope * lesser(std::abs(rise_p), std::abs(rise_q)) +
-                        lesser(t.bend * std::abs(rise_p - rise_q), kMostBend * least) + 1e-37f;
-  const float depth = greater(0.0f, 1.0f - distance / allowed);
-  const int dot = p.nx[at_p] * q.nx[at_q] + p.ny[at_p] * q.ny[at_q] + p.nz[at_p] * q.nz[at_q];
-  float cosine = lesser(greater(static_cast<float>(dot) * kSquaredNormalUnit, 0.0f), 1.0f);
+  const F32 allowed = least + lesser(magnitude(rise_p), magnitude(rise_q)) * t.slope +
+                      lesser(magnitude(rise_p - rise_q) * t.bend, least * kMostBend) + 1e-37f * scale;
+  const F32 depth = greater(all(0.0f), 1.0f - distance / allowed);
+  const I32 dot = p.nx * q.nx + p.ny * q.ny + p.nz * q.nz;
+  F32 cosine = lesser(greater(as_floats(dot) * kSquaredNormalUnit, all(0.0f)), all(1.0f));
   cosine *= cosine, cosine *= cosine, cosine *= cosine;
-  const float weight = greater(depth * depth * cosine * 255.0f + 0.5f, float{kMinGuide});
-  const bool both = (p.disparity[at_p] > 0.0f) & (q.disparity[at_q] > 0.0f);
-  return static_cast<uint8_t>(static_cast<int>(both ? weight : 0.0f));
+  const F32 weight = greater(depth * depth * cosine * 255.0f + 0.5f, all(float{kMinGuide}));
+  return truncated(nearer > 0.0f ? weight : all(0.0f));
 }
 
 void guide_row(int width, int step, const SurfaceRow& here, const SurfaceRow& below, const GuideTerms& terms,
                const std::array<uint8_t*, 4>& weights) {
   const SurfaceRow p = here, q = below;
   const GuideTerms t = terms;
-  const float apart = static_cast<float>(step);
+  const float scale = 1.0f / static_cast<float>(step);
   uint8_t *right = weights[0], *down = weights[1], *down_right = weights[2], *down_left = weights[3];
-#pragma GCC ivdep
-  for (int x = 0; x < width; ++x) {
-    right[x] = guide_weight(p, x, p, x + step, apart, 0.0f, t);
-    down[x] = guide_weight(p, x, q, x, 0.0f, apart, t);
-    down_right[x] = guide_weight(p, x, q, x + step, apart, apart, t);
-    down_left[x] = guide_weight(p, x, q, x - step, -apart, apart, t);
+  for (int x = 0; x < width; x += kFloats) {
+    const Surfaces own = load(p, x);
+    const auto pair = [&](size_t direction, const SurfaceRow& other, int at) {
+      return guide_weights(own, load(p.rise[direction] + x), load(other, at), load(other.rise[direction] + at), scale,
+                           t);
+    };
+    store_bytes(right + x, pair(0, p, x + step));
+    store_bytes(down + x, pair(1, q, x));
+    store_bytes(down_right + x, pair(2, q, x + step));
+    store_bytes(down_left + x, pair(3, q, x - step));
   }
 }
 
@@ -71,15 +84,17 @@ inline uint8_t raised(uint8_t weight, uint8_t p, uint8_t q) {
   return weight < least ? least : weight;
 }
 
-void raise_guides_row(int width, int step, const uint8_t* here, const uint8_t* below,
-                      const std::array<uint8_t*, 4>& weights) {
-  uint8_t *right = weights[0], *down = weights[1], *down_right = weights[2], *down_left = weights[3];
+void raise_guides_row(int width, int step, const PairRow& weights, const uint8_t* here, const uint8_t* below,
+                      const std::array<uint8_t*, 4>& raised_weights) {
+  const PairRow w = weights;
+  uint8_t *right = raised_weights[0], *down = raised_weights[1], *down_right = raised_weights[2],
+          *down_left = raised_weights[3];
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
-    right[x] = raised(right[x], here[x], here[x + step]);
-    down[x] = raised(down[x], here[x], below[x]);
-    down_right[x] = raised(down_right[x], here[x], below[x + step]);
-    down_left[x] = raised(down_left[x], here[x], below[x - step]);
+    right[x] = raised(w[0][x], here[x], here[x + step]);
+    down[x] = raised(w[1][x], here[x], below[x]);
+    down_right[x] = raised(w[2][x], here[x], below[x + step]);
+    down_left[x] = raised(w[3][x], here[x], below[x - step]);
   }
 }
 

@@ -7,9 +7,10 @@
 #include <immintrin.h>
 #endif
 
-/// Vectors of 16-bit integers, as wide as those of the instruction set that the including file is compiled for. (GCC 12
-/// vectorises plain loops of such products with 32 bits.) Local to each file, because every instruction set compiles
-/// them.
+/// Vectors as wide as those of the instruction set that the including file is compiled for. GCC 12 vectorises plain
+/// loops of 16-bit products with 32 bits; and plain loops over types of several widths take as many pixels at a time as
+/// the narrowest type has lanes, so that most variables are in memory. Local to each file, because every instruction
+/// set compiles them.
 namespace packtrace {
 namespace {
 
@@ -24,7 +25,12 @@ constexpr int kLanes = 8;
 using U16 __attribute__((vector_size(2 * kLanes))) = uint16_t;
 using I16 __attribute__((vector_size(2 * kLanes))) = int16_t;
 
+constexpr int kFloats = kLanes / 2;
+using F32 __attribute__((vector_size(4 * kFloats))) = float;
+using I32 __attribute__((vector_size(4 * kFloats))) = int32_t;
+
 inline U16 all(uint16_t value) { return U16{} + value; }
+inline F32 all(float value) { return F32{} + value; }
 
 inline U16 load(const uint16_t* from) {
   U16 v;
@@ -36,11 +42,20 @@ inline I16 load(const int16_t* from) {
   std::memcpy(&v, from, sizeof(v));
   return v;
 }
+inline F32 load(const float* from) {
+  F32 v;
+  std::memcpy(&v, from, sizeof(v));
+  return v;
+}
+inline void store(float* to, F32 v) { std::memcpy(to, &v, sizeof(v)); }
+inline F32 as_floats(I32 v) { return __builtin_convertvector(v, F32); }
+inline I32 truncated(F32 v) { return __builtin_convertvector(v, I32); }
 inline void store(uint16_t* to, U16 v) { std::memcpy(to, &v, sizeof(v)); }
 inline void store(int16_t* to, I16 v) { std::memcpy(to, &v, sizeof(v)); }
 
 // lesser, greater; average: of two lanes, rounded up; product: the upper half, which is the product of fractions in
-// units of 2^-16; part_of: the product of a fraction in units of 2^-15 and a value, rounded to nearest.
+// units of 2^-16; part_of: the product of a fraction in units of 2^-15 and a value, rounded to nearest. load_wide:
+// of kFloats values; store_bytes: of values from 0 to 255.
 #if defined(__AVX512BW__)
 inline U16 lesser(U16 a, U16 b) { return (U16)_mm512_min_epu16((__m512i)a, (__m512i)b); }
 inline U16 greater(U16 a, U16 b) { return (U16)_mm512_max_epu16((__m512i)a, (__m512i)b); }
@@ -51,6 +66,16 @@ inline U16 magnitude(I16 a) { return (U16)_mm512_abs_epi16((__m512i)a); }
 inline U16 load_bytes(const uint8_t* from) {
   return (U16)_mm512_cvtepu8_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
 }
+constexpr __mmask16 kEach = 0xffff; // GCC 12 takes the forms without a mask for uses of uninitialised values
+inline F32 lesser(F32 a, F32 b) { return (F32)_mm512_maskz_min_ps(kEach, (__m512)b, (__m512)a); }
+inline F32 greater(F32 a, F32 b) { return (F32)_mm512_maskz_max_ps(kEach, (__m512)b, (__m512)a); }
+inline F32 magnitude(F32 a) { return (F32)((I32)a & 0x7fffffff); }
+inline I32 load_wide(const int16_t* from) {
+  return (I32)_mm512_maskz_cvtepi16_epi32(kEach, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
+}
+inline void store_bytes(uint8_t* to, I32 v) {
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm512_maskz_cvtepi32_epi8(kEach, (__m512i)v));
+}
 #elif defined(__AVX2__)
 inline U16 lesser(U16 a, U16 b) { return (U16)_mm256_min_epu16((__m256i)a, (__m256i)b); }
 inline U16 greater(U16 a, U16 b) { return (U16)_mm256_max_epu16((__m256i)a, (__m256i)b); }
@@ -60,6 +85,16 @@ inline I16 part_of(U16 a, I16 b) { return (I16)_mm256_mulhrs_epi16((__m256i)a, (
 inline U16 magnitude(I16 a) { return (U16)_mm256_abs_epi16((__m256i)a); }
 inline U16 load_bytes(const uint8_t* from) {
   return (U16)_mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+}
+inline F32 lesser(F32 a, F32 b) { return (F32)_mm256_min_ps((__m256)b, (__m256)a); }
+inline F32 greater(F32 a, F32 b) { return (F32)_mm256_max_ps((__m256)b, (__m256)a); }
+inline F32 magnitude(F32 a) { return (F32)_mm256_andnot_ps(_mm256_set1_ps(-0.0f), (__m256)a); }
+inline I32 load_wide(const int16_t* from) {
+  return (I32)_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+}
+inline void store_bytes(uint8_t* to, I32 v) {
+  const __m128i words = _mm_packs_epi32(_mm256_castsi256_si128((__m256i)v), _mm256_extracti128_si256((__m256i)v, 1));
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(to), _mm_packus_epi16(words, words));
 }
 #else
 template <typename F>
@@ -87,6 +122,17 @@ inline U16 load_bytes(const uint8_t* from) {
   U16 v{};
   for (int i = 0; i < kLanes; ++i) v[i] = from[i];
   return v;
+}
+inline F32 lesser(F32 a, F32 b) { return b < a ? b : a; }
+inline F32 greater(F32 a, F32 b) { return a < b ? b : a; }
+inline F32 magnitude(F32 a) { return (F32)((I32)a & 0x7fffffff); }
+inline I32 load_wide(const int16_t* from) {
+  I32 v{};
+  for (int i = 0; i < kFloats; ++i) v[i] = from[i];
+  return v;
+}
+inline void store_bytes(uint8_t* to, I32 v) {
+  for (int i = 0; i < kFloats; ++i) to[i] = static_cast<uint8_t>(v[i]);
 }
 #endif
 
