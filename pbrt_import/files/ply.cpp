@@ -334,6 +334,14 @@ void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const Rep
     report(Severity::kWarning, 0, std::to_string(too_short) + " faces have fewer than three corners: ignored");
 }
 
+/// Reports colours, which pbrt ignores as well.
+void report_colours(const PlyHeader& header, const ReportFn& report) {
+  for (const std::string_view element : {kVertices, kFaces})
+    for (const std::string_view red : {"red", "diffuse_red", "r"})
+      if (const PlyElement* const found = header.find(element); report && found && found->find(red, false))
+        report(Severity::kWarning, 0, "colours of the element '" + std::string(element) + "' are left out");
+}
+
 template <class Source>
 PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report, MeshMemory memory) {
   PlyMesh result;
@@ -351,6 +359,7 @@ PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report
     else
       read_strips(source, element, result.mesh, report, memory);
   }
+  report_colours(header, report);
   result.dropped_triangles = clean_up_mesh(result.mesh, report);
   return result;
 }

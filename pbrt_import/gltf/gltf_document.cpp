@@ -145,6 +145,10 @@ void Document::check_extensions() const {
       throw Error(ErrorKind::kUnsupported,
                   "the file requires the extension " + in_quotes(name) + ", which is not supported");
   }
+  const std::optional<Value> used = root().find("extensionsUsed");
+  for (size_t i = 0; used && i < used->size(); ++i)
+    if (const std::string name = (*used)[i].text(); std::ranges::find(kKnownExtensions, name) == kKnownExtensions.end())
+      context_.feed.reporter().warning(place(), "the extension " + in_quotes(name) + " is left out");
 }
 
 Value Document::element(const char* array, uint64_t index) const {

@@ -59,6 +59,8 @@ std::string Materials::image_file(uint64_t number) {
     file_names_.accept(path);
     return path.string();
   }
+  if (image.has("name"))
+    document_.context().feed.reporter().note(document_.place(), "names of images in the file are left out");
   const std::string name =
       "image " + std::to_string(number) + " of glTF file " + std::to_string(document_.file_number());
   file_names_.embed(name, document_.image_bytes(number));
@@ -76,19 +78,19 @@ uint64_t image_of(const Value& texture) {
 
 } // namespace
 
-/// Mean of an image's values, as they are stored.
-Vec3 Materials::image_average(const Value& info) {
+/// Mean of an image's values, as they are stored or linear.
+Vec3 Materials::image_average(const Value& info, bool decode_srgb) {
   const uint64_t image = image_of(document_.element("textures", info.at("index").integer()));
-  const auto [place, added] = averages_.try_emplace(image);
+  const auto [place, added] = averages_.try_emplace({image, decode_srgb});
   Average& average = place->second;
-  if (added) average.problem = problem_of([&] { average.value = read_average(image); });
+  if (added) average.problem = problem_of([&] { average.value = read_average(image, decode_srgb); });
   if (!average.problem.empty()) throw Error(ErrorKind::kInput, average.problem);
   return average.value;
 }
 
-Vec3 Materials::read_average(uint64_t number) {
+Vec3 Materials::read_average(uint64_t number, bool decode_srgb) {
   MemoryReservation memory(document_.context().options.memory);
-  return read_image(document_.image_bytes(number), false, {}, memory).average;
+  return read_image(document_.image_bytes(number), decode_srgb, {}, memory).average;
 }
 
 void Materials::read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset) {
@@ -162,12 +164,29 @@ float Materials::index_of(const Value& material) {
   return static_cast<float>((1.0 + root) / (1.0 - root));
 }
 
+/// Says what nothing below reads.
+void Materials::report_losses(const Value& material) {
+  if (material.has("normalTexture")) warn("normal maps are left out: surfaces keep the normals of their vertices");
+  if (material.has("occlusionTexture")) warn("textures of occlusion are left out: occlusion is computed");
+  if (const std::optional<Value> specular = material.extension("KHR_materials_specular"))
+    if (specular->has("specularTexture") || specular->has("specularColorTexture") ||
+        specular->has("specularColorFactor"))
+      warn("KHR_materials_specular is reduced to its factor; its colour and textures are left out");
+  if (const std::optional<Value> transmission = material.extension("KHR_materials_transmission");
+      transmission && transmission->has("transmissionTexture"))
+    warn("textures of transmission are left out");
+  for (const char* name : {"KHR_materials_anisotropy", "KHR_materials_clearcoat", "KHR_materials_iridescence",
+                           "KHR_materials_sheen", "KHR_materials_volume"})
+    if (material.extension(name)) warn(std::string(name) + " is left out");
+}
+
 void Materials::define(const Value& material, MaterialUse& use) {
   const nlohmann::json empty = nlohmann::json::object();
   const Value base = material.find("pbrMetallicRoughness").value_or(Value(empty, material.path()));
   const std::vector<double> factor = base.numbers_or("baseColorFactor", {1.0, 1.0, 1.0, 1.0});
   const Vec3 colour = glm::clamp(to_vec3(factor), Vec3(0.0f), Vec3(1.0f));
   const std::optional<Value> image = base.find("baseColorTexture");
+  report_losses(material);
   std::string texture;
   if (image) texture = define_image(*image, use, "base colour", std::nullopt);
   DirectiveFeed& feed = document_.context().feed;
@@ -193,20 +212,22 @@ void Materials::define(const Value& material, MaterialUse& use) {
   } else if (mode != "OPAQUE") {
     material.fail("has the unknown alphaMode \"" + mode + "\"");
   }
+  if (mode == "BLEND" && !use.absent && !transmits)
+    warn("blending is reduced to surfaces that are opaque where alpha is at least 0.5, with holes where it is less");
   if (const std::optional<Value> transmission = material.extension("KHR_materials_transmission"))
     transmits = transmits || transmission->number_or("transmissionFactor", 0.0) >= 0.5;
   const std::optional<Value> strength = material.extension("KHR_materials_emissive_strength");
   use.emission = to_vec3(material.numbers_or("emissiveFactor", {0.0, 0.0, 0.0})) *
                  static_cast<float>(strength ? strength->number_or("emissiveStrength", 1.0) : 1.0);
   if (glm::any(glm::lessThan(use.emission, Vec3(0.0f)))) material.fail("emits negative light");
-  if (const std::optional<Value> specular = material.extension("KHR_materials_specular"))
-    if (specular->has("specularTexture") || specular->has("specularColorTexture") ||
-        specular->has("specularColorFactor"))
-      warn("KHR_materials_specular is reduced to its factor; its colour and textures are left out");
-
+  if (const std::optional<Value> glow = material.find("emissiveTexture"); glow && use.emission != Vec3(0.0f)) {
+    const std::string problem = problem_of([&] { use.emission *= image_average(*glow, true); });
+    warn(problem.empty() ? "textures of emission are reduced to their means"
+                         : "a texture of emission counts as white: " + problem);
+  }
   Vec3 means(1.0f); // of roughness in y, of metalness in z
   if (const std::optional<Value> texture = base.find("metallicRoughnessTexture")) {
-    const std::string problem = problem_of([&] { means = image_average(*texture); });
+    const std::string problem = problem_of([&] { means = image_average(*texture, false); });
     warn(problem.empty() ? "textures of metalness and roughness are reduced to their means"
                          : "a texture of metalness and roughness counts as white: " + problem);
   }
@@ -220,6 +241,7 @@ void Materials::define(const Value& material, MaterialUse& use) {
     feed.colour(parameter, colour);
   else
     feed.texture(parameter, texture);
+  if (material.has("normalTexture")) feed.number("bumpmap", 0.0f); // its presence is kept, its content is not
   if (kind != "matte") feed.number("eta", index_of(material));
   if (kind == "disney") {
     feed.number("metallic", clamped(base.number_or("metallicFactor", 1.0) * double{means.z}));

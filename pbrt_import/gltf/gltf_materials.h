@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "pbrt_import/gltf/gltf_document.h"
@@ -42,17 +43,18 @@ private:
   float index_of(const Value& material);
   void read_mapping(const Value& info, MaterialUse& use, Vec2& scale, Vec2& offset);
   std::string image_file(uint64_t image);
-  Vec3 image_average(const Value& info);
-  Vec3 read_average(uint64_t image);
+  Vec3 image_average(const Value& info, bool decode_srgb);
+  Vec3 read_average(uint64_t image, bool decode_srgb);
   std::string unique_name(const Value& material, size_t number);
+  void report_losses(const Value& material);
   void warn(const std::string& text);
 
   Document& document_;
   FileNames& file_names_;
   std::vector<MaterialUse> uses_;
   MaterialUse default_;
-  std::unordered_set<std::string> names_; ///< of the materials so far
-  std::map<uint64_t, Average> averages_;  ///< by image
+  std::unordered_set<std::string> names_;                 ///< of the materials so far
+  std::map<std::pair<uint64_t, bool>, Average> averages_; ///< by image, and whether its mean is linear
 };
 
 } // namespace packtrace::gltf

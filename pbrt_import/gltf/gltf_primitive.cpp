@@ -242,6 +242,8 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
   PrimitiveMesh mesh = draco ? read_draco(document, primitive, *draco, uv_name, pose.skinned())
                              : read_plain(document, primitive, uv_name, pose.skinned());
   if (mesh.positions.empty()) primitive.fail("has no positions");
+  if (primitive.at("attributes").has("COLOR_0"))
+    feed.reporter().warning(document.place(), "colours of vertices are left out");
   if (pose.skinned()) check_joints(mesh.joints, mesh.vertices, pose.joints->size(), primitive);
   PosedFrames::Source source;
   if (pose.frames) source = frame_source(document, mesh_value, primitive, *pose.frames, mesh);

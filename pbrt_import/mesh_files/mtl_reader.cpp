@@ -47,7 +47,9 @@ private:
     if (keyword == "map_d") return read_map(material.opacity_map);
     if (keyword == "map_Bump" || keyword == "map_bump" || keyword == "bump" || keyword == "norm")
       return read_map(material.normal_map);
-    // Everything else (Ka, map_Ks, refl, decal, Ps, ...) has no meaning for what packtrace computes.
+    for (const std::string_view meaningless : {"Ka", "map_Ka", "sharpness", "map_aat"}) // of ambient light and filters
+      if (keyword == meaningless) return;
+    reporter_.warning(place(), in_quotes(keyword) + " is left out");
   }
 
   void begin_material() {
@@ -105,6 +107,10 @@ private:
     return value;
   }
 
+  void report_option(const LineWord& option) {
+    reporter_.warning(place(option.column), "the option " + in_quotes(option.text) + " of a texture is left out");
+  }
+
   void read_map(MtlMap& map) {
     map = MtlMap{};
     map.place = place();
@@ -113,13 +119,18 @@ private:
         map.scale = read_vector(Vec2(1.0f));
       } else if (option.text == "-o" || option.text == "-t") {
         const Vec2 offset = read_vector(Vec2(0.0f));
-        if (option.text == "-o") map.offset = offset; // -t is turbulence
+        if (option.text == "-o")
+          map.offset = offset;
+        else
+          report_option(option); // turbulence
       } else if (option.text == "-clamp") {
         map.clamp = lines_.word().text == "on";
       } else if (option.text == "-mm") {
         lines_.number_word(), lines_.number_word();
+        report_option(option);
       } else {
-        lines_.word(); // -blendu, -blendv, -bm, -boost, -cc, -imfchan, -texres, -type take one word
+        const LineWord value = lines_.word(); // -blendu, -blendv, -bm, -boost, -cc, -texres and -type take one word
+        if (option.text == "-imfchan" && value.text != "l") report_option(option);
       }
     }
     const std::string_view name = lines_.rest();

@@ -72,6 +72,11 @@ void define_material(const MtlMaterial& material, DirectiveFeed& feed) {
   if (bumps) define_texture(material, "bump", "float", material.normal_map, feed);
   if (!material.opacity_map.file.empty()) define_texture(material, "opacity", "float", material.opacity_map, feed);
 
+  if (bumps)
+    feed.reporter().warning(material.normal_map.place,
+                            "normal and bump maps are left out: surfaces keep the normals of their vertices");
+  if (material.opacity > 0.0f && material.opacity < 1.0f && !transmits(material))
+    feed.reporter().warning(material.place, "materials that are partly transparent are opaque, or glass below 0.5");
   feed.begin("MakeNamedMaterial", material.place, {material.name});
   const bool measured = material.roughness || material.metallic;
   const bool shiny = material.specular != Vec3(0.0f);
@@ -81,6 +86,7 @@ void define_material(const MtlMaterial& material, DirectiveFeed& feed) {
     feed.colour("Kt", glm::min(material.diffuse.value_or(Vec3(1.0f)), Vec3(1.0f)));
     feed.number("eta", std::max(material.refraction, 1.0f));
     colour = {};
+    if (!diffuse.empty()) feed.reporter().warning(material.diffuse_map.place, "glass has no image: map_Kd is left out");
   } else if (measured) {
     feed.text("type", "disney");
     feed.number("metallic", std::clamp(material.metallic.value_or(0.0f), 0.0f, 1.0f));

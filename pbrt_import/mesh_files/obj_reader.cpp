@@ -112,7 +112,11 @@ private:
   void read_statement() {
     const LineWord keyword = lines_.word();
     const std::string_view word = keyword.text;
-    if (word == "v") return read_vector(positions_, "v", 3);
+    if (word == "v") {
+      read_vector(positions_, "v", 3);
+      if (const LineWord more = lines_.peek(); !more.text.empty()) report_colour(more);
+      return;
+    }
     if (word == "vt") return read_vector(uvs_, "vt", 1);
     if (word == "vn") return read_vector(normals_, "vn", 3);
     if (word == "f" || word == "fo") return read_face();
@@ -130,12 +134,23 @@ private:
     read_other(keyword);
   }
 
+  /// A fourth number is a weight, which only curves have; colours have three more.
+  void report_colour(const LineWord& fourth) {
+    lines_.number_word();
+    if (lines_.number_word()) reporter_.warning(place(fourth.column), "colours of vertices are left out");
+  }
+
   void read_other(const LineWord& keyword) {
     using namespace std::string_view_literals;
     const auto is_any_of = [&](auto... names) { return ((keyword.text == names) || ...); };
-    if (is_any_of("g"sv, "s"sv, "lod"sv, "mg"sv, "bevel"sv, "c_interp"sv, "d_interp"sv, "shadow_obj"sv, "trace_obj"sv,
-                  "maplib"sv, "usemap"sv))
+    if (is_any_of("g"sv, "lod"sv, "mg"sv, "bevel"sv, "c_interp"sv, "d_interp"sv, "shadow_obj"sv, "trace_obj"sv))
       return; // neither geometry nor material
+    if (is_any_of("maplib"sv, "usemap"sv)) return reporter_.warning(place(), in_quotes(keyword.text) + " is left out");
+    if (keyword.text == "s") {
+      const std::string_view group = lines_.rest();
+      smooth_ = group == "off" || group == "0" || group.empty() ? Place{} : place();
+      return;
+    }
     if (is_any_of("p"sv, "l"sv))
       return reporter_.warning(place(), "points and lines have no surface; they are left out");
     if (is_any_of("vp"sv, "cstype"sv, "deg"sv, "bmat"sv, "step"sv, "curv"sv, "curv2"sv, "surf"sv, "parm"sv, "trim"sv,
@@ -233,6 +248,8 @@ private:
     const auto [found, added] =
         group_numbers_.try_emplace({object_, material_, uvs, normals}, static_cast<uint32_t>(groups_.size()));
     if (added) groups_.push_back({material_, uvs, normals, place(), {}});
+    if (added && !normals && smooth_.line > 0)
+      reporter_.warning(smooth_, "smoothing groups are left out: faces without normals are flat");
     last_group_ = &groups_[found->second];
     return *last_group_;
   }
@@ -288,6 +305,7 @@ private:
   std::deque<FaceGroup> groups_;
   std::map<std::tuple<uint32_t, uint32_t, bool, bool>, uint32_t> group_numbers_; ///< by object, material, attributes
   FaceGroup* last_group_ = nullptr;
+  Place smooth_; ///< of the current smoothing group; line 0: none
   uint32_t object_ = 0, material_ = ObjMaterials::kDefault;
   std::vector<Corner> face_; ///< scratch buffers
   std::vector<Vec3> points_;

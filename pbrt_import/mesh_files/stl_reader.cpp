@@ -14,6 +14,7 @@
 namespace packtrace {
 namespace {
 
+constexpr const char* kNoColours = "colours of triangles are left out";
 constexpr size_t kHeaderBytes = 84, kRecordBytes = 50; // 80 bytes of text, a count; a normal, three corners, 16 bits
 
 /// Triangles claimed by the header of a binary file.
@@ -31,6 +32,13 @@ bool is_binary(std::string_view content) {
   TextLines lines(content);
   if (!lines.next()) return true;
   return lines.word().text != "solid";
+}
+
+/// Whether a record's last 16 bits, which several programs fill with colours, are not 0.
+bool has_colours(std::string_view content) {
+  for (size_t at = kHeaderBytes; content.size() - at >= kRecordBytes; at += kRecordBytes)
+    if (content[at + kRecordBytes - 1] != 0 || content[at + kRecordBytes - 2] != 0) return true;
+  return false;
 }
 
 /// Three points per triangle.
@@ -76,8 +84,9 @@ private:
     const LineWord word = lines_.word();
     if (word.text == "vertex") return read_vertex(word);
     if (word.text == "endloop" || word.text == "endfacet") return end_loop();
-    for (const std::string_view known : {"solid", "endsolid", "facet", "outer", "color"})
+    for (const std::string_view known : {"solid", "endsolid", "facet", "outer"})
       if (word.text == known) return;
+    if (word.text == "color") return reporter_.warning(place(word.column), kNoColours);
     reporter_.error(place(word.column), "unknown statement " + in_quotes(word.text) + "; it is ignored");
   }
 
@@ -122,9 +131,10 @@ void read_stl(const std::filesystem::path& file, uint32_t file_number, const Mes
   const PaddedText content = read_padded(file, context);
   context.progress.begin("reading the STL file", 0);
   MemoryReservation memory(context.options.memory);
-  const std::vector<Vec3> corners = is_binary(content.text)
-                                        ? read_binary(content.text, memory)
-                                        : StlText(content.text, file_number, feed.reporter()).read(memory);
+  const bool binary = is_binary(content.text);
+  const std::vector<Vec3> corners =
+      binary ? read_binary(content.text, memory) : StlText(content.text, file_number, feed.reporter()).read(memory);
+  if (binary && has_colours(content.text)) feed.reporter().warning({file_number, 0, 0}, kNoColours);
   if (corners.size() > static_cast<size_t>(std::numeric_limits<int32_t>::max()))
     throw Error(ErrorKind::kLimitExceeded, "the file has more than 2^31 - 1 corners");
   memory.resize(memory.bytes() + corners.size() * (5 * sizeof(uint32_t) + sizeof(Vec3)),

@@ -37,6 +37,44 @@ TEST(GltfProblems, AreNamedByTheirPath) {
   expect("points and lines have no surface", [](Json& j) { j["meshes"][0]["primitives"][0]["mode"] = 1; });
 }
 
+TEST(GltfProblems, WhatIsLeftOutIsCountedAndSaidOnce) {
+  const SceneFolder folder;
+  GltfBuilder gltf;
+  const Json texture = {{"index", 0}}, kNothing = Json::object();
+  const Json material = {
+      {"normalTexture", texture},
+      {"occlusionTexture", texture},
+      {"emissiveTexture", texture},
+      {"emissiveFactor", {1, 1, 1}},
+      {"alphaMode", "BLEND"},
+      {"pbrMetallicRoughness", {{"baseColorTexture", texture}, {"metallicRoughnessTexture", texture}}},
+      {"extensions",
+       {{"KHR_materials_clearcoat", kNothing},
+        {"KHR_materials_specular", {{"specularTexture", texture}}},
+        {"KHR_materials_transmission", {{"transmissionFactor", 0.1}, {"transmissionTexture", texture}}}}}};
+  gltf.json["materials"] = {material, material};
+  gltf.json["extensionsUsed"] = {"KHR_materials_clearcoat", "EXT_unheard_of"};
+  gltf.json["images"] = {{{"bufferView", gltf.view(good_png())}, {"mimeType", "image/png"}, {"name", "bricks"}}};
+  gltf.json["textures"] = {{{"source", 0}}};
+  const Json primitive = {{"attributes",
+                           {{"POSITION", gltf.positions({0, 0, 0, 1, 0, 0, 0, 1, 0})},
+                            {"COLOR_0", gltf.positions({1, 0, 0, 0, 1, 0, 0, 0, 1})}}},
+                          {"material", 0}};
+  const Imported imported = import_gltf(folder, with_primitive(primitive, gltf));
+  for (const char* const expected :
+       {"warning: the extension \"EXT_unheard_of\" is left out", "warning: normal maps are left out",
+        "warning: textures of occlusion are left out", "warning: textures of emission are reduced to their means",
+        "warning: blending is reduced", "warning: KHR_materials_clearcoat is left out",
+        "warning: KHR_materials_specular is reduced to its factor", "warning: textures of transmission are left out",
+        "warning: textures of metalness and roughness are reduced", "warning: colours of vertices are left out",
+        "note: names of images in the file are left out"})
+    EXPECT_TRUE(imported.reported(expected)) << expected << "\n" << imported.text();
+  EXPECT_TRUE(imported.reported("normal maps are left out: surfaces keep the normals of their vertices (2 times"))
+      << imported.text();
+  ASSERT_EQ(imported.scene.materials.size(), 1u);
+  EXPECT_EQ(imported.scene.materials[0].flags & (kNormalMap | kEmissive), kNormalMap | kEmissive);
+}
+
 TEST(GltfProblems, EndTheImportWhereNothingIsLeft) {
   const SceneFolder folder;
   const auto fails = [&](const std::string& text, ErrorKind kind, const std::string& expected) {

@@ -161,7 +161,7 @@ TEST(GltfMaterials, ColoursMasksAndLight) {
     gltf.json["images"] = {{{"bufferView", gltf.view(good_png())}, {"mimeType", "image/png"}}};
     gltf.json["textures"] = {{{"source", 0}}};
     ImportOptions options;
-    options.keep_textures = true;
+    options.keep_textures = options.keep_shading = true;
     return import_gltf(folder, with_primitive(primitive, gltf), options);
   };
   const auto only = [&](const Json& description) {
@@ -175,6 +175,9 @@ TEST(GltfMaterials, ColoursMasksAndLight) {
   EXPECT_EQ(only({{"emissiveFactor", {1, 1, 1}}, {"extensions", {{"KHR_materials_unlit", Json::object()}}}}).flags,
             kEmissive);
   EXPECT_EQ(only({{"extensions", {{"KHR_materials_transmission", {{"transmissionFactor", 1}}}}}}).flags, kTransmissive);
+  const Json dark = {{"emissiveFactor", {1, 1, 1}}, {"emissiveTexture", {{"index", 0}}}};
+  const Imported glow = material(dark); // of the linear means of 128 and 64, of 255
+  EXPECT_NEAR(only_material(glow).shading.emission.x, 0.5f * (0.21586f + 0.05127f), 1e-4f) << glow.text();
   const Imported textured =
       material({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}}});
   EXPECT_EQ(textured.text(), "");

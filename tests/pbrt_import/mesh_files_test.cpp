@@ -209,6 +209,26 @@ TEST(ObjFiles, MistakesAreReportedWhereTheyAre) {
   EXPECT_EQ(imported.scene.dropped_triangles, 1u);
 }
 
+TEST(ObjFiles, WhatIsLeftOutIsReportedWhereItIs) {
+  const SceneFolder folder;
+  folder.write("a.tga", grey_tga(2, 1, {0, 255}));
+  folder.write("m.mtl", "newmtl a\nKa 1 1 1\nd 0.2\nmap_Kd a.tga\nmap_Ks a.tga\nnewmtl b\nd 0.7\n"
+                        "bump -mm 0 2 a.tga\nmap_Kd -t 1 1 1 -imfchan m a.tga\nmap_Ks a.tga\n");
+  const Imported imported = import_file(
+      folder.write("a.obj", "mtllib m.mtl\nusemap x\nusemtl a\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0 1\ns 1\nf 1 2 3\n"));
+  for (const char* const expected :
+       {"m.mtl:4:1: warning: glass has no image", "m.mtl:5:1: warning: \"map_Ks\" is left out (2 times, first here)",
+        "m.mtl:6:1: warning: materials that are partly transparent are opaque",
+        "m.mtl:8:1: warning: normal and bump maps are left out", "m.mtl:8:6: warning: the option \"-mm\"",
+        "m.mtl:9:8: warning: the option \"-t\"", "m.mtl:9:17: warning: the option \"-imfchan\"",
+        "a.obj:2:1: warning: \"usemap\" is left out", "a.obj:4:9: warning: colours of vertices are left out",
+        "a.obj:7:1: warning: smoothing groups are left out"})
+    EXPECT_TRUE(imported.reported(expected)) << expected << "\n" << imported.text();
+  EXPECT_FALSE(imported.reported("\"Ka\"")) << imported.text();
+  const Imported plain = import_file(folder.write("b.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0 1\ns off\nf 1 2 3\n"));
+  EXPECT_EQ(plain.text(), "");
+}
+
 TEST(ObjFiles, MemoryIsLimited) {
   const SceneFolder folder;
   std::string text;
@@ -256,6 +276,16 @@ TEST(StlFiles, BinaryAndTextGiveTheSameMesh) {
     EXPECT_EQ(imported.scene.meshes[0].positions, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}));
     EXPECT_EQ(imported.scene.meshes[0].triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
   }
+}
+
+TEST(StlFiles, ColoursAreReported) {
+  const SceneFolder folder;
+  std::string binary = binary_stl(kTwoTriangles);
+  binary.back() = '\x80';
+  EXPECT_TRUE(import_file(folder.write("a.stl", binary)).reported("a.stl: warning: colours of triangles are left out"));
+  std::string text(kTextStl);
+  text.insert(text.find("facet"), "color 1 0 0\n");
+  EXPECT_TRUE(import_file(folder.write("b.stl", text)).reported("b.stl:2:1: warning: colours of triangles"));
 }
 
 TEST(StlFiles, DamageIsReported) {

@@ -134,6 +134,19 @@ TEST(Ply, SkipsWhatItDoesNotKnow) {
   }
 }
 
+TEST(Ply, ColoursAreReported) {
+  Writer writer(kFormats[0]);
+  writer.line("element vertex 3").line("property float x").line("property float y").line("property float z");
+  writer.line("property uchar red").line("element face 1").line("property list uchar int vertex_indices");
+  writer.line("end_header");
+  for (int i = 0; i < 3; ++i) writer.put("float", i).put("float", i * i).put("float", 0).put("uchar", 255);
+  writer.list("uchar", "int", {0, 1, 2});
+  Reports reports;
+  read(writer.text(), &reports);
+  ASSERT_EQ(reports.messages.size(), 1u);
+  EXPECT_EQ(reports.messages[0], "colours of the element 'vertex' are left out");
+}
+
 TEST(Ply, FacesMayComeBeforeVertices) {
   for (const Format format : kFormats) {
     Writer writer(format);
