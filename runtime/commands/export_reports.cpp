@@ -13,6 +13,18 @@ namespace {
 
 constexpr const char* kMotionLeftOut = "motion is left out: everything is where it was at the time of the bake\n";
 
+nlohmann::json to_json(const std::vector<ExportLoss>& losses) {
+  nlohmann::json counts = nlohmann::json::object();
+  for (const ExportLoss& loss : losses) counts[std::string(loss.key)] = loss.count;
+  return counts;
+}
+
+std::string to_text(const std::vector<ExportLoss>& losses) {
+  std::string text;
+  for (const ExportLoss& loss : losses) text += fmt::format(grouped(), "{:L} {}\n", loss.count, loss.what);
+  return text;
+}
+
 } // namespace
 
 nlohmann::json to_json(const ExportNames& names, const Vertex16Report& r) {
@@ -76,6 +88,7 @@ nlohmann::json to_json(const ExportNames& names, const GltfReport& r) {
           {"simplified_materials", r.simplified_materials},
           {"skipped_cameras", r.skipped_cameras},
           {"moving", r.moving},
+          {"losses", to_json(r.losses)},
           {"levels", r.levels},
           {"max_normal_error_degrees", r.max_normal_error_degrees},
           {"max_uv_error", r.max_uv_error},
@@ -108,6 +121,7 @@ std::string to_text(const ExportNames& names, const GltfReport& r) {
   note(r.simplified_materials, "materials lost their texture, because it is mapped differently from their alpha mask");
   note(r.skipped_cameras, "cameras were skipped, because glTF has no environment cameras");
   if (r.moving) text += kMotionLeftOut;
+  text += to_text(r.losses);
   return text;
 }
 
@@ -125,6 +139,7 @@ nlohmann::json to_json(const ExportNames& names, const SceneReport& r) {
           {"vertices", r.vertices},
           {"triangles", r.triangles},
           {"moving", r.moving != 0},
+          {"losses", to_json(r.losses)},
           {"bytes", {{"total", r.file_bytes}}},
           {"peak_rss_bytes", peak_rss_bytes()}};
 }
@@ -136,6 +151,7 @@ std::string to_text(const ExportNames& names, const SceneReport& r) {
                   "{:L} bytes in all files\n",
                   names.output, r.vertices, r.triangles, r.shapes, r.instances, r.materials, r.images, r.file_bytes);
   if (r.moving != 0) text += kMotionLeftOut;
+  text += to_text(r.losses);
   return text;
 }
 

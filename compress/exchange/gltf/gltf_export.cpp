@@ -208,6 +208,7 @@ private:
     report.moving = !file_.sections().rigid_motion.empty() || !file_.sections().deformation.empty();
     report.image_bytes = materials_.image_bytes(), report.simplified_materials = materials_.simplified();
     report.min_texture_psnr = materials_.lowest_psnr();
+    report.losses = find_losses(file_, ExportFormat::kGltf, {config_.levels, config_.material_extensions});
   }
 
   const BakedFile& file_;

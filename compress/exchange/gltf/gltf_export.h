@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compress/exchange/gltf/export_losses.h"
 #include "compress/exchange/gltf/gltf_config.h"
 #include "compress/format/file/baked_file.h"
 #include "pbrt_import/base/progress.h"
@@ -21,8 +22,9 @@ struct GltfReport {
   uint64_t plain_primitives = 0; ///< stored as floats: the lattice has too many bits for the codec, or Draco fails
   /// Exported without their texture, because mask and texture have different transforms.
   uint64_t simplified_materials = 0;
-  bool moving = false;          ///< motion is left out: everything is at the time that was baked
-  uint64_t skipped_cameras = 0; ///< environment cameras, which glTF lacks, and cameras without pixels
+  bool moving = false;            ///< motion is left out: everything is at the time that was baked
+  uint64_t skipped_cameras = 0;   ///< environment cameras, which glTF lacks, and cameras without pixels
+  std::vector<ExportLoss> losses; ///< of what no other counter has
   // Errors against the baked file.
   double max_normal_error_degrees = 0.0; ///< of the codec meshopt
   double max_uv_error = 0.0;             ///< of the codec meshopt

@@ -94,10 +94,12 @@ int GltfMaterials::texture_of(uint32_t mask, uint32_t albedo_texture) {
   if (!added) return place->second;
   const AlphaMaskView bits = mask != baked::kNone ? file_.mask(mask) : AlphaMaskView{};
   const TextureView colours = albedo_texture != baked::kNone ? file_.texture(albedo_texture) : TextureView{};
-  return place->second = add_texture(image_of(bits, colours), mask != baked::kNone ? bits.wrap : colours.wrap);
+  const std::string_view name =
+      albedo_texture != baked::kNone ? file_.text(file_.sections().textures[albedo_texture].name) : std::string_view{};
+  return place->second = add_texture(image_of(bits, colours), mask != baked::kNone ? bits.wrap : colours.wrap, name);
 }
 
-int GltfMaterials::add_texture(const RgbaImage& image, WrapMode wrap) {
+int GltfMaterials::add_texture(const RgbaImage& image, WrapMode wrap, std::string_view name) {
   const bool webp = config_.webp_psnr > 0.0;
   std::vector<std::byte> bytes;
   if (webp) {
@@ -108,8 +110,9 @@ int GltfMaterials::add_texture(const RgbaImage& image, WrapMode wrap) {
     bytes = encode_png(image);
   }
   image_bytes_ += bytes.size();
-  const int source = model_.add(
-      "images", {{"bufferView", model_.add_view(bytes, 0)}, {"mimeType", webp ? "image/webp" : "image/png"}});
+  GltfJson stored{{"bufferView", model_.add_view(bytes, 0)}, {"mimeType", webp ? "image/webp" : "image/png"}};
+  if (config_.names && !name.empty()) stored["name"] = to_utf8(name);
+  const int source = model_.add("images", std::move(stored));
   const int mode = wrap == WrapMode::kRepeat ? kRepeat : kClampToEdge;
   const auto [sampler, added] = samplers_.try_emplace(mode, 0);
   if (added) sampler->second = model_.add("samplers", {{"wrapS", mode}, {"wrapT", mode}, {"magFilter", kLinear}});

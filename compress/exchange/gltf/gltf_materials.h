@@ -48,7 +48,7 @@ private:
   void add(const baked::MaterialRecord& record, const UvMap& stored);
   void add_image(const baked::MaterialRecord& record, uint32_t mask, const UvMap& stored, GltfJson& material, Use& use);
   int texture_of(uint32_t mask, uint32_t albedo_texture);
-  int add_texture(const struct RgbaImage& image, WrapMode wrap);
+  int add_texture(const struct RgbaImage& image, WrapMode wrap, std::string_view name);
 
   const BakedFile& file_;
   const GltfConfig& config_;

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "compress/exchange/gltf/export_losses.h"
+
 namespace packtrace {
 
 /// A file of an export.
@@ -24,6 +26,7 @@ struct SceneReport {
   uint64_t vertices = 0, triangles = 0; ///< as stored in the files
   uint64_t file_bytes = 0;              ///< of all files
   uint64_t moving = 0;                  ///< 1 if motion is left out: everything is at the time that was baked
+  std::vector<ExportLoss> losses;
 };
 
 /// An export that consists of several files.

@@ -47,6 +47,7 @@ public:
     SceneReport& report = result_.report;
     report.materials = names_.size();
     report.moving = !file_.sections().rigid_motion.empty() || !file_.sections().deformation.empty();
+    report.losses = find_losses(file_, ExportFormat::kObj);
     for (const ExportedFile& f : result_.files) report.file_bytes += f.bytes.size();
     return std::move(result_);
   }

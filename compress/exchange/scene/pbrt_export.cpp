@@ -76,6 +76,7 @@ public:
     SceneReport& report = result_.report;
     report.materials = names_.size(), report.cameras = file_.cameras().empty() ? 0 : 1;
     report.moving = !file_.sections().rigid_motion.empty() || !file_.sections().deformation.empty();
+    report.losses = find_losses(file_, ExportFormat::kPbrt);
     result_.files.push_back({stem + ".pbrt", bytes_of_text(text_)});
     for (const ExportedFile& f : result_.files) report.file_bytes += f.bytes.size();
     return std::move(result_);
@@ -138,6 +139,10 @@ private:
     if (textured)
       add_texture(name + " colour", "spectrum", texture_file(folder_, record.albedo_texture),
                   file_.texture(record.albedo_texture));
+    if ((record.flags & kInvisible) != 0) {
+      text_ += "MakeNamedMaterial \"" + name + "\" \"string type\" \"none\"\n";
+      return;
+    }
     std::string_view type = "matte", parameter = "Kd";
     if ((record.flags & kMirror) != 0)
       type = "mirror", parameter = "Kr";
@@ -157,7 +162,10 @@ private:
     const baked::MaterialRecord& record = file_.sections().materials[material];
     const baked::GeometryRecord& lattice = file_.geometries()[geometry];
     text_ += "AttributeBegin\nNamedMaterial \"" + names_[material] + "\"\n";
-    if ((record.flags & kEmissive) != 0) text_ += "AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\n";
+    if ((record.flags & kEmissive) != 0)
+      text_ += (record.flags & kEmitsBothSides) != 0
+                   ? "AreaLightSource \"diffuse\" \"rgb L\" [1 1 1] \"bool twosided\" \"true\"\n"
+                   : "AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\n";
     text_ += "Shape \"plymesh\" \"string filename\" \"" + escaped(mesh_file(geometry, part)) +
              "\" \"integer lattice\" [" + std::to_string(lattice.step_mantissa) + " " +
              std::to_string(lattice.step_exponent) + "]";
@@ -165,6 +173,8 @@ private:
       text_ += " \"texture alpha\" \"" + names_[material] + " alpha\"";
     if ((record.flags & kShadowAlphaMask) != 0 && record.shadow_alpha_mask != baked::kNone)
       text_ += " \"texture shadowalpha\" \"" + names_[material] + " shadow alpha\"";
+    else if ((record.flags & kNoShadow) != 0)
+      text_ += " \"float shadowalpha\" 0";
     text_ += "\nAttributeEnd\n";
     ++result_.report.shapes;
   }

@@ -68,6 +68,7 @@ public:
     report.materials = file_.sections().materials.size(), report.instances = file_.instances().size();
     report.vertices = positions_.size() / 3, report.triangles = triangles_.size() / 3;
     report.moving = !file_.sections().rigid_motion.empty() || !file_.sections().deformation.empty();
+    report.losses = find_losses(file_, ExportFormat::kStreams);
     result_.files.push_back({stem + ".json", bytes_of_text(json_.dump(1) + "\n")});
     for (const ExportedFile& f : result_.files) report.file_bytes += f.bytes.size();
     return std::move(result_);
