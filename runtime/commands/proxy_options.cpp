@@ -8,7 +8,7 @@ namespace packtrace {
 namespace {
 
 constexpr const char *kNoProxy = "off", *kVoxelsName = "voxels", *kFieldName = "sdf";
-constexpr const char *kConservativeName = "conservative", *kThinName = "thin";
+constexpr const char *kConservativeName = "conservative", *kThinName = "thin", *kMatchedName = "matched";
 
 } // namespace
 
@@ -27,8 +27,9 @@ void add_proxy_options(CLI::App& verb, ProxyOptions& options) {
       ->group(kGroup);
   verb.add_option("--proxy-surface", options.rule,
                   "Which voxels are set. conservative: all that the surface touches; thin: fewer, without holes that a "
-                  "path through faces could pass (default conservative)")
-      ->check(one_of({kConservativeName, kThinName}))
+                  "path through faces could pass; matched: as many, from the inside outwards, as hide what the "
+                  "triangles hide, for render --proxy-beyond (default conservative)")
+      ->check(one_of({kConservativeName, kThinName, kMatchedName}))
       ->group(kGroup);
   verb.add_option("--proxy-bits", options.field_bits, "Bits of a distance with --proxy sdf, 8 or 16 (default 8)")
       ->check(CLI::IsMember({8u, 16u}))
@@ -76,6 +77,10 @@ ProxyConfig make_proxy_config(const ProxyOptions& options) {
     throw Error(ErrorKind::kUsage,
                 "--proxy-voxels must be 1 to " + std::to_string(kMaxGridSize) + ", the largest grid");
   if (options.rule == kThinName) config.rule = VoxelRule::kSeparating;
+  if (options.rule == kMatchedName) config.rule = VoxelRule::kMatched;
+  if (config.rule == VoxelRule::kMatched && options.fill)
+    throw Error(ErrorKind::kUsage,
+                "--proxy-fill has no effect with --proxy-surface matched, which fills closed geometries");
   config.fill = options.fill, config.dag = options.dag, config.materials = options.materials;
   if (config.dag && config.materials)
     throw Error(ErrorKind::kUsage, "--proxy-dag and --proxy-materials exclude each other: equal parts of the tree may "

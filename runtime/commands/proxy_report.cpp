@@ -10,7 +10,10 @@
 namespace packtrace {
 namespace {
 
-const char* surface_of(const ProxySummary& use) { return (use.flags & voxels::kThin) != 0 ? "thin" : "conservative"; }
+const char* surface_of(const ProxySummary& use) {
+  if ((use.flags & voxels::kMatched) != 0) return "matched";
+  return (use.flags & voxels::kThin) != 0 ? "thin" : "conservative";
+}
 
 double per_diagonal(const ProxySummary& use, double error) { return error / (use.edge * std::sqrt(3.0)); }
 

@@ -66,6 +66,63 @@ TEST(Proxies, StatedErrorsHoldForAnIndependentSample) {
   }
 }
 
+/// Mean area that a set hides, in object units squared, from random lines within a radius of the origin.
+double hidden_area(const Proxy& proxy, double radius) {
+  const VoxelSet set = decode_occupancy(proxy.voxels);
+  test::Random random(11);
+  constexpr uint32_t kLines = 15000;
+  uint32_t met = 0;
+  for (uint32_t n = 0; n < kLines; ++n) {
+    DVec3 along(2.0), aside(2.0);
+    while (!(glm::length(along) <= 1.0)) along = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+    while (!(glm::length(aside) <= 1.0)) aside = {random.uniform(-1, 1), random.uniform(-1, 1), 0.0};
+    along = glm::normalize(along);
+    const DVec3 right = glm::normalize(glm::cross(along, DVec3(0.3, 0.5, 0.8))), up = glm::cross(along, right);
+    for (double t = -radius; t < radius; t += 0.1 * proxy.record.edge) {
+      const DVec3 p = radius * (aside.x * right + aside.y * up) + t * along;
+      const DVec3 v = glm::floor((p - proxy.frame().origin) / proxy.record.edge);
+      if (!set.contains(static_cast<int64_t>(v.x), static_cast<int64_t>(v.y), static_cast<int64_t>(v.z))) continue;
+      ++met;
+      break;
+    }
+  }
+  return 3.14159265 * radius * radius * met / kLines;
+}
+
+TEST(Proxies, MatchedVoxelsHideWhatTheTrianglesHide) {
+  BakeConfig config = proxy_config(12), conservative = config;
+  config.proxy.rule = VoxelRule::kMatched;
+  const Scene ball = test::scene_of(test::sphere_mesh(40)), sheet = test::scene_of(test::grid_mesh(4));
+  const Proxy matched = proxies_of(test::bake(ball, config)).at(0);
+  EXPECT_EQ(matched.record.flags, voxels::kMatched | voxels::kFilled | voxels::kClosedSource);
+  EXPECT_NEAR(hidden_area(matched, 1.3), 3.14159265, 0.03 * 3.14159265);
+  EXPECT_GT(hidden_area(proxies_of(test::bake(ball, conservative)).at(0), 1.3), 1.15 * 3.14159265);
+  // By Cauchy's formula, a sheet of area 1 hides 1 / 2.
+  const Proxy open = proxies_of(test::bake(sheet, config)).at(0);
+  EXPECT_EQ(open.record.flags, voxels::kMatched);
+  EXPECT_NEAR(hidden_area(open, 1.5), 0.5, 0.03);
+  EXPECT_GT(hidden_area(proxies_of(test::bake(sheet, conservative)).at(0), 1.5), 0.55);
+}
+
+/// Two closed slabs far thinner than a voxel beside a ball that erosion alone would match.
+TEST(Proxies, MatchedVoxelsAreNearEverySurface) {
+  Mesh mesh = test::sphere_mesh(40);
+  mesh.normals.clear(), mesh.uvs.clear();
+  const auto add = [&](std::array<Vec3, 3> corners) {
+    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), corners.begin(), corners.end());
+    mesh.triangles.emplace_back(first, first + 1, first + 2);
+    mesh.triangles.emplace_back(first, first + 2, first + 1); // every edge twice: closed
+  };
+  add({Vec3(2, 0, 0), Vec3(4, 0, 0), Vec3(4, 0.01f, 0)});
+  add({Vec3(2, 0, 2), Vec3(2, 0.01f, 4), Vec3(2, 0, 4)});
+  BakeConfig config = proxy_config(20);
+  config.proxy.rule = VoxelRule::kMatched;
+  const Proxy proxy = proxies_of(test::bake(test::scene_of(mesh), config)).at(0);
+  EXPECT_NE(proxy.record.flags & voxels::kFilled, 0u);
+  EXPECT_LE(proxy.record.surface_error, 1.5 * std::sqrt(3.0) * proxy.record.edge);
+}
+
 /// A triangle in the corner of a voxel does not touch the octahedron that the separating rule tests.
 TEST(Proxies, SmallPartsFarFromOthersHaveAVoxel) {
   Mesh mesh = test::sphere_mesh(40);

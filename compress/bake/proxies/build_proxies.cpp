@@ -61,7 +61,8 @@ std::optional<Proxy> build_voxels(const BakedFile& file, uint32_t geometry, std:
   proxy.record = {geometry,
                   voxels::kVoxelProxy,
                   (source.closed ? voxels::kClosedSource : 0) | (voxels.filled ? voxels::kFilled : 0) |
-                      (config.rule == VoxelRule::kSeparating ? voxels::kThin : 0),
+                      (config.rule == VoxelRule::kSeparating ? voxels::kThin : 0) |
+                      (config.rule == VoxelRule::kMatched ? voxels::kMatched : 0),
                   0,
                   {origin.x, origin.y, origin.z},
                   voxels.frame.edge,

@@ -7,6 +7,7 @@
 
 #include "compress/bake/lod/bound/triangle_distance.h"
 #include "compress/bake/proxies/cancellation.h"
+#include "compress/bake/proxies/matched_voxels.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -45,6 +46,13 @@ struct FineGrid {
 
 DVec3 vec(const LatticePoint& p) {
   return DVec3(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+}
+
+/// A number of 0..1 that depends on a voxel without any order.
+double any_of(VoxelIndex v) {
+  uint32_t hash = v[0] * 0x8da6b343u ^ v[1] * 0xd8163841u ^ v[2] * 0xcb1ab31fu;
+  hash = (hash ^ hash >> 15) * 0x2c1b3c6du;
+  return static_cast<double>(hash ^ hash >> 13) * 0x1p-32;
 }
 
 /// Numbers the voxels of a set in its order.
@@ -105,9 +113,12 @@ public:
     for_each_pair([&](const OccludingTriangle&, VoxelIndex v) { result_.set.set(v); });
     if (config_.rule == VoxelRule::kSeparating) keep_small_parts();
     const VoxelSet surface = result_.set;
-    if (config_.fill && source_.closed) fill();
+    if (config_.rule == VoxelRule::kMatched)
+      match();
+    else if (config_.fill && source_.closed)
+      fill();
     measure_voxels();
-    measure_surface(surface);
+    measure_surface(config_.rule == VoxelRule::kMatched ? result_.set : surface);
     return std::move(result_);
   }
 
@@ -137,11 +148,7 @@ private:
       const DVec3 center = (vec(t.corners[0]) + vec(t.corners[1]) + vec(t.corners[2])) / (3.0 * grid_.edge_steps());
       const DVec3 own = glm::clamp(glm::floor(center), DVec3(0.0), DVec3(size[0] - 1.0, size[1] - 1.0, size[2] - 1.0));
       const auto x = static_cast<int64_t>(own.x), y = static_cast<int64_t>(own.y), z = static_cast<int64_t>(own.z);
-      bool near = false;
-      for (int64_t k = -1; k <= 1; ++k)
-        for (int64_t j = -1; j <= 1; ++j)
-          for (int64_t i = -1; i <= 1; ++i) near |= before.contains(x + i, y + j, z + k);
-      if (!near)
+      if (!near_any(before, x, y, z))
         result_.set.set({static_cast<uint32_t>(own.x), static_cast<uint32_t>(own.y), static_cast<uint32_t>(own.z)});
     }
   }
@@ -151,26 +158,86 @@ private:
     result_.filled = true;
   }
 
-  void measure_voxels() {
-    constexpr float kNone = std::numeric_limits<float>::infinity();
+  /// Keeps voxels from the inside outwards until they hide as many lines as the triangles do: those whose centres are
+  /// deepest inside a closed surface, or nearest to an open one.
+  void match() {
+    const VoxelSet surface = result_.set;
+    result_.set = source_.closed ? inside_voxels(source_, config_.voxels) : VoxelSet(grid_.size);
+    result_.filled = source_.closed;
+    const VoxelNumbers numbers(surface);
+    const uint64_t bytes = numbers.count() * sizeof(float) + source_.triangles.size() * sizeof(DVec3) * 3;
+    const MemoryReservation memory(budget_, bytes, "the matched voxels of " + what_);
+    std::vector<float> depths = center_distances(surface, numbers);
+    surface.for_each([&](VoxelIndex v) {
+      float& depth = depths[numbers[v]];
+      depth = (result_.set.test(v) ? -depth : depth) + static_cast<float>(kTieBreak * grid_.edge_steps() * any_of(v));
+    });
+    const double per_voxel = 1.0 / grid_.edge_steps();
+    std::vector<std::array<DVec3, 3>> triangles;
+    for (const OccludingTriangle& t : source_.triangles)
+      triangles.push_back(
+          {per_voxel * vec(t.corners[0]), per_voxel * vec(t.corners[1]), per_voxel * vec(t.corners[2])});
+    LineScene scene{grid_.size, triangles, {}, {}};
+    scene.opaque = [&](size_t t, DVec3 point) {
+      constexpr double kPart = 0.25; // of a voxel, in which a mask must leave something
+      const OccludingTriangle& triangle = source_.triangles[t];
+      return !triangle.masked ||
+             opaque_within(file_, runs_, triangle, (point - 0.5 * kPart) / per_voxel, kPart / per_voxel);
+    };
+    scene.depth = [&](VoxelIndex v) {
+      constexpr float kNever = std::numeric_limits<float>::infinity();
+      if (surface.test(v)) return depths[numbers[v]];
+      return result_.set.test(v) ? -kNever : kNever;
+    };
+    const float most = matching_depth(scene);
+    surface.for_each([&](VoxelIndex v) { depths[numbers[v]] <= most ? result_.set.set(v) : result_.set.clear(v); });
+    keep_near(surface);
+  }
+
+  /// Sets voxels of a surface that are more than one voxel away from any that is set.
+  void keep_near(const VoxelSet& surface) {
+    surface.for_each([&](VoxelIndex v) {
+      const auto [x, y, z] = std::array<int64_t, 3>{v[0], v[1], v[2]};
+      if (!near_any(result_.set, x, y, z)) result_.set.set(v);
+    });
+  }
+
+  /// Whether a voxel or one of the 26 around it is set.
+  static bool near_any(const VoxelSet& set, int64_t x, int64_t y, int64_t z) {
+    for (int64_t k = -1; k <= 1; ++k)
+      for (int64_t j = -1; j <= 1; ++j)
+        for (int64_t i = -1; i <= 1; ++i)
+          if (set.contains(x + i, y + j, z + k)) return true;
+    return false;
+  }
+
+  /// Distances in lattice steps from the centres of a set's voxels to the nearest of the triangles that set them.
+  /// @param slots of these triangles, if wanted
+  std::vector<float> center_distances(const VoxelSet& set, const VoxelNumbers& numbers,
+                                      std::vector<uint32_t>* slots = nullptr) const {
     const double edge = grid_.edge_steps();
-    const VoxelNumbers numbers(result_.set);
-    // Surface voxels are within working_bytes().
-    const uint64_t bytes = numbers.count() * (sizeof(float) + (config_.materials ? sizeof(result_.slots[0]) : 0));
-    const MemoryReservation memory(budget_, result_.filled ? bytes : 0, "the filled voxels of " + what_);
-    std::vector<float> distances(static_cast<size_t>(numbers.count()), kNone); // inside: nothing sets them
-    if (config_.materials) result_.slots.resize(distances.size());
+    std::vector<float> distances(static_cast<size_t>(numbers.count()), kNoDistance);
     for_each_pair([&](const OccludingTriangle& t, VoxelIndex v) {
+      if (!set.test(v)) return;
       const DVec3 center = edge * (DVec3(v[0], v[1], v[2]) + 0.5);
       const DVec3 nearest = nearest_point(center, vec(t.corners[0]), vec(t.corners[1]), vec(t.corners[2]));
       const auto distance = static_cast<float>(glm::distance(center, nearest));
       const size_t number = numbers[v];
       if (!(distance < distances[number])) return;
       distances[number] = distance;
-      if (config_.materials) result_.slots[number] = t.slot;
+      if (slots != nullptr) (*slots)[number] = t.slot;
     });
-    for (const float d : distances)
-      if (d != kNone) result_.voxel_error = std::max(result_.voxel_error, double{d});
+    return distances;
+  }
+
+  void measure_voxels() {
+    const VoxelNumbers numbers(result_.set);
+    // Surface voxels are within working_bytes().
+    const uint64_t bytes = numbers.count() * (sizeof(float) + (config_.materials ? sizeof(result_.slots[0]) : 0));
+    const MemoryReservation memory(budget_, result_.filled ? bytes : 0, "the filled voxels of " + what_);
+    if (config_.materials) result_.slots.resize(static_cast<size_t>(numbers.count()));
+    for (const float d : center_distances(result_.set, numbers, config_.materials ? &result_.slots : nullptr))
+      if (d != kNoDistance) result_.voxel_error = std::max(result_.voxel_error, double{d});
     result_.voxel_error *= source_.step;
   }
 
@@ -210,6 +277,9 @@ private:
       if (best < std::numeric_limits<double>::infinity() || reach > 8) return best;
     }
   }
+
+  static constexpr double kTieBreak = 1.0 / 64.0; // voxels; so that of equally deep ones some can be chosen
+  static constexpr float kNoDistance = std::numeric_limits<float>::infinity(); // inside: no triangle sets the voxel
 
   const BakedFile& file_;
   std::span<const uint32_t> runs_;
