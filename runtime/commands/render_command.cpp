@@ -23,7 +23,6 @@
 #include "runtime/commands/sequence_render.h"
 #include "runtime/commands/voxel_render.h"
 #include "runtime/stopwatch.h"
-#include "runtime/voxels/proxy_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -102,10 +101,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
     result["seams"] = visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels,
                                          detail.camera_uses_levels() ? loop.detail() : nullptr);
   }
-  if (const auto* const proxies = dynamic_cast<const ProxyTracer*>(loop.tracers().back()))
-    result["proxies"] = {{"beyond_px", *options.proxy_beyond_px}, {"instances", proxies->proxied().size()}};
-  else if (options.proxy_beyond_px)
-    result["proxies"] = {{"beyond_px", *options.proxy_beyond_px}, {"instances", 0}};
+  if (options.proxy_beyond_px) result["proxies"] = used_proxies_json(config, loop);
   if (!report.seen && !globals.quiet)
     print_printable(options.input + ": warning: this camera sees nothing of the scene; try --camera auto\n", stderr);
   if (!globals.quiet) warn_of_flat_instances(options.input, first_tracer.flat_instances().size());
@@ -113,10 +109,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;
   print_render(text, result);
-  if (result.contains("proxies"))
-    fmt::print(text, "  proxies   occlusion rays see {} instances as voxels{}\n",
-               result["proxies"]["instances"].get<size_t>(),
-               result["proxies"]["instances"] == 0 ? ": none is small, or triangles are faster" : "");
+  if (result.contains("proxies")) fmt::print(text, "{}", used_proxies_text(result["proxies"]));
   if (globals.verbosity > 0)
     fmt::print(text, "{}", choices_text(options, globals, camera, config, loaded, first_tracer, timings));
   return 0;

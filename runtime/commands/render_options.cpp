@@ -139,9 +139,14 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option(
           "--proxy-beyond", options.proxy_beyond_px,
           "Occlusion rays see instances smaller than so many pixels as their voxels where that makes rays faster: "
-          "if they have many triangles, and enough of the picture shows them. For .ptk files baked with --proxy "
-          "voxels")
+          "if they have many triangles, and enough of the picture shows them, and the error allows it "
+          "(--proxy-error). For .ptk files baked with --proxy voxels, best with --proxy-surface matched")
       ->type_name("PX")
+      ->group("Levels of detail");
+  verb.add_option("--proxy-error", options.proxy_error,
+                  "Largest mean error of ambient occlusion with which voxels are used, 0..1 (default 0.01). It is "
+                  "measured at 256 pixels before")
+      ->type_name("E")
       ->group("Levels of detail");
   add_sequence_options(verb, options.sequence);
   add_scene_options(verb, options.scene);
@@ -203,6 +208,9 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
   const uint64_t frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
   config.frames = options.sequence.path ? 1 : static_cast<uint32_t>(std::min<uint64_t>(frames, ~0u));
   config.proxy_beyond_px = options.proxy_beyond_px;
+  if (options.proxy_error && !options.proxy_beyond_px)
+    throw Error(ErrorKind::kUsage, "--proxy-error requires --proxy-beyond");
+  config.proxy_error = options.proxy_error.value_or(config.proxy_error);
   config.validate();
   config.ao.radius = ao_radius(config.ao, source.world_bounds());
   return config;

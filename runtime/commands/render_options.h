@@ -43,6 +43,7 @@ struct RenderOptions {
   std::optional<std::string> bvh;
   LodOptions lod;
   std::optional<double> proxy_beyond_px; ///< FrameConfig::proxy_beyond_px
+  std::optional<double> proxy_error;     ///< FrameConfig::proxy_error
   SequenceOptions sequence;
 };
 

@@ -20,6 +20,7 @@
 #include "runtime/image/background.h"
 #include "runtime/image/png.h"
 #include "runtime/stopwatch.h"
+#include "runtime/voxels/proxy_tracer.h"
 #include "runtime/voxels/voxel_picture.h"
 
 namespace packtrace {
@@ -33,7 +34,7 @@ void refuse_other_options(const RenderOptions& options) {
   const AoOptions &ao = options.ao, &ao_defaults = defaults.ao;
   const bool sequence = options.sequence.path || options.sequence.keys || options.sequence.start_time;
   const bool denoiser = options.denoiser != defaults.denoiser || !options.denoiser_settings.empty();
-  const std::array<std::pair<const char*, bool>, 16> given = {{
+  const std::array<std::pair<const char*, bool>, 17> given = {{
       {"--aov", !options.aovs.empty()},
       {"--ground-truth", options.ground_truth},
       {"--no-legend", options.no_legend},
@@ -49,6 +50,7 @@ void refuse_other_options(const RenderOptions& options) {
       {"--fast-edges", options.fast_edges},
       {"--lod-error", options.lod.error_px.has_value()},
       {"--proxy-beyond", options.proxy_beyond_px.has_value()},
+      {"--proxy-error", options.proxy_error.has_value()},
       {"--path, --keys and --start-time", sequence},
   }};
   std::vector<std::string> names;
@@ -159,6 +161,25 @@ int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
     fmt::print(output.text_stream(), "mean difference of visibility from that of the rays: taps {:.3f}, cones {:.3f}\n",
                traced.tap_error, traced.cone_error);
   return 0;
+}
+
+nlohmann::json used_proxies_json(const FrameConfig& config, const FrameLoop& loop) {
+  const auto* const proxies = dynamic_cast<const ProxyTracer*>(loop.tracers().back());
+  const std::optional<double> error = loop.proxy_error();
+  return {{"beyond_px", *config.proxy_beyond_px},
+          {"instances", proxies != nullptr ? proxies->proxied().size() : 0},
+          {"error", error ? nlohmann::json(*error) : nlohmann::json()},
+          {"most_error", config.proxy_error}};
+}
+
+std::string used_proxies_text(const nlohmann::json& used) {
+  const auto instances = used["instances"].get<size_t>();
+  const nlohmann::json& error = used["error"];
+  const std::string start = fmt::format("  proxies   occlusion rays see {} instances as voxels: ", instances);
+  if (error.is_null()) return start + "none is small, or triangles are faster\n";
+  return start + fmt::format("the mean error of ambient occlusion {} {:.4f}, {} --proxy-error {}\n",
+                             instances > 0 ? "is" : "would be", error.get<double>(), instances > 0 ? "within" : "above",
+                             used["most_error"].get<double>());
 }
 
 } // namespace packtrace

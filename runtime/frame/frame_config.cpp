@@ -39,6 +39,7 @@ void FrameConfig::validate() const {
                   "image size times supersample exceeds 65536 per side or 2^28 pixels");
   detail.validate();
   packtrace::validate(shade);
+  require_setting(proxy_error >= 0.0 && proxy_error <= 1.0, "--proxy-error must be 0 to 1");
   if (!proxy_beyond_px) return;
   require_setting(*proxy_beyond_px > 0.0 && *proxy_beyond_px <= 1e9,
                   "--proxy-beyond must be a number of pixels above 0");

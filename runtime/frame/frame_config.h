@@ -85,6 +85,8 @@ struct FrameConfig {
   /// Size in pixels, > 0, below which occlusion rays meet an instance's voxels in place of its triangles, where that is
   /// faster (ProxyChoice). Unset: always triangles. Not with levels of detail, interreflection or things that move.
   std::optional<double> proxy_beyond_px;
+  double proxy_error =
+      0.01; ///< [0..1]: largest mean error of ambient occlusion with which voxels are used (proxy_error())
 
   bool shades() const { return view != FrameView::kAo; }
   Exposure display() const { return {tone_map, exposure}; }

@@ -128,7 +128,7 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
   report_.primary_rays = gbuffer_.size.pixels();
   report_.hit_pixels = count_hits(gbuffer_);
   if (config_.proxy_beyond_px && report_.moved)
-    state_.choose_proxies(view, gbuffer_, *config_.proxy_beyond_px, report_);
+    state_.choose_proxies(view, gbuffer_, *config_.proxy_beyond_px, config_.proxy_error, config_.ao, report_);
   if (config_.detail.only_occlusion && detail() != nullptr) {
     if (report_.moved) state_.choose_detail(view, &gbuffer_, report_);
     const Stopwatch lifting;

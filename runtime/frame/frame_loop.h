@@ -76,6 +76,8 @@ public:
   /// The source and the tracers in use: the camera's, and with only_occlusion also the occlusion rays'.
   const SceneSource& traced_source() const { return state_.traced_source(); }
   std::vector<const RayTracer*> tracers() const { return state_.tracers(); }
+  /// SceneState::proxy_error().
+  std::optional<double> proxy_error() const { return state_.proxy_error(); }
   /// The lights and materials of shaded views; null before the first frame of one.
   const ShadeScene* shade_scene() const { return shading_.scene(); }
   const DetailPlanner* detail() const { return state_.planner(); }

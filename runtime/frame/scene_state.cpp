@@ -10,6 +10,7 @@
 #include "runtime/trace/packed/scene/mesh_motion.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 #include "runtime/voxels/proxy_choice.h"
+#include "runtime/voxels/proxy_error.h"
 #include "runtime/voxels/proxy_tracer.h"
 
 namespace packtrace {
@@ -185,7 +186,8 @@ void SceneState::build_level_0(FrameReport& report) {
   report.times.build_s += building.seconds();
 }
 
-void SceneState::choose_proxies(const PrimaryCamera& view, const GBuffer& seen, double pixels, FrameReport& report) {
+void SceneState::choose_proxies(const PrimaryCamera& view, const GBuffer& seen, double pixels, double most_error,
+                                const AoConfig& ao, FrameReport& report) {
   if (scene_.file == nullptr) throw Error(ErrorKind::kUnsupported, "--proxy-beyond requires a .ptk file with proxies");
   if (!pose_.empty() || meshes_ || levels_)
     throw Error(ErrorKind::kUnsupported, "--proxy-beyond does not work with things that move or change by distance");
@@ -197,8 +199,12 @@ void SceneState::choose_proxies(const PrimaryCamera& view, const GBuffer& seen, 
   if (proxied != proxied_) {
     proxied_ = std::move(proxied);
     proxy_tracer_.reset(); // frees its memory first
-    if (!proxied_.empty())
+    proxy_error_.reset();
+    if (!proxied_.empty()) {
       proxy_tracer_ = std::make_unique<ProxyTracer>(*level_0_, *scene_.file, *scene_.source, proxied_, scene_.backend);
+      proxy_error_ = packtrace::proxy_error(*scene_.source, *level_0_, *proxy_tracer_, seen, ao);
+      if (!(*proxy_error_ <= most_error)) proxy_tracer_.reset();
+    }
   }
   report.times.build_s += building.seconds();
 }

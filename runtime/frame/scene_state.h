@@ -53,10 +53,14 @@ public:
   /// Makes the tracer of level 0 if there is none.
   void build_level_0(FrameReport& report);
 
-  /// Chooses the instances that occlusion rays see as proxies, and makes their tracer if they changed.
+  /// Chooses the instances that occlusion rays see as proxies, and makes their tracer if they changed. Then measures
+  /// the error of ambient occlusion, and leaves all of them triangles if it is larger than `most_error`.
   /// @param seen, pixels as in ProxyChoice
   /// Throws Error(kUnsupported) without a file, or if something moves.
-  void choose_proxies(const PrimaryCamera& view, const GBuffer& seen, double pixels, FrameReport& report);
+  void choose_proxies(const PrimaryCamera& view, const GBuffer& seen, double pixels, double most_error,
+                      const AoConfig& ao, FrameReport& report);
+  /// What was measured for the instances that ProxyChoice chose last; nothing if it chose none.
+  std::optional<double> proxy_error() const { return proxy_error_; }
 
   /// Forgets the frame before.
   void reset();
@@ -97,10 +101,11 @@ private:
   std::unique_ptr<RayTracer> level_tracer_;   ///< traces planner_->source()
   std::unique_ptr<RayTracer> proxy_tracer_;   ///< null if no instance is seen as its proxy
   std::unique_ptr<ProxyChoice> proxy_choice_; ///< null until one is needed
-  std::vector<uint32_t> proxied_;             ///< instances that proxy_tracer_ traces as voxels
-  std::unique_ptr<MeshMotion> meshes_;        ///< null if no mesh deforms
-  std::unique_ptr<InstanceBoxes> boxes_;      ///< null if nothing moves
-  bool started_ = false;                      ///< there is a frame before
+  std::vector<uint32_t> proxied_;             ///< instances for which proxy_tracer_ was made, even if it was dropped
+  std::optional<double> proxy_error_;
+  std::unique_ptr<MeshMotion> meshes_;   ///< null if no mesh deforms
+  std::unique_ptr<InstanceBoxes> boxes_; ///< null if nothing moves
+  bool started_ = false;                 ///< there is a frame before
   std::vector<Affine> pose_, last_pose_; ///< by SceneMotion::moving_instances(): of this frame and the previous one
   std::vector<Affine> last_world_;       ///< world_from_object of all instances in the previous frame
 };

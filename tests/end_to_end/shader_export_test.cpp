@@ -124,6 +124,10 @@ TEST(ShaderExport, OptionsWithoutEffectAreErrors) {
   for (const char* option : {"--no-legend", "--fast-edges", "--ao-no-falloff"})
     refused({"render", bench.baked(), "-o", bench / "x.png", "--view", "voxels", option}, option);
   refused({"render", bench.baked(), "-o", bench / "x.png", "--view", "sdf", "--proxy-beyond", "8"}, "--proxy-beyond");
+  refused({"render", bench.baked(), "-o", bench / "x.png", "--proxy-error", "0.1"}, "--proxy-error requires");
+  refused(
+      {"bake", bench.scene(), "-o", bench / "x.ptk", "--proxy", "voxels", "--proxy-surface", "matched", "--proxy-fill"},
+      "--proxy-fill has no effect");
   const CommandResult without =
       run_packtrace({"render", bench.baked(), "-o", bench / "x.png", "--frames", "1", "--proxy-beyond", "8"});
   EXPECT_EQ(without.exit_code, 4);
