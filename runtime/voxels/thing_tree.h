@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -39,8 +40,8 @@ public:
       const Node& node = nodes_[static_cast<size_t>(next.what)];
       const Floats t = ray.entries(node, t_max);
       const size_t first = open;
-      for (int i = 0; i < kWidth; ++i) {
-        if (!(t[i] < kMissed)) continue;
+      for (uint32_t met = lanes(t < kMissed); met != 0; met &= met - 1) {
+        const int i = std::countr_zero(met);
         size_t place = open++; // the farthest lies deepest
         for (; place > first && stack[place - 1].t < t[i]; --place) stack[place] = stack[place - 1];
         stack[place] = {t[i], node.child[i]};
@@ -56,6 +57,19 @@ private:
   static constexpr size_t kDepth = 16, kStack = kDepth * (kWidth - 1) + 1; // of 2^32 things
   static constexpr float kMissed = std::numeric_limits<float>::infinity(), kLargest = std::numeric_limits<float>::max();
   using Floats [[gnu::vector_size(16)]] = float;
+
+  using Lanes [[gnu::vector_size(16)]] = int32_t;
+
+  /// Bit i: lane i of a comparison holds.
+  [[gnu::always_inline]] static uint32_t lanes(Lanes holds) {
+#ifdef __SSE2__
+    return static_cast<uint32_t>(__builtin_ia32_movmskps(std::bit_cast<Floats>(holds)));
+#else
+    uint32_t bits = 0;
+    for (int i = 0; i < kWidth; ++i) bits |= holds[i] != 0 ? 1u << i : 0u;
+    return bits;
+#endif
+  }
 
   struct Node {
     std::array<Floats, kAxes> low, high; ///< of each child; no ray meets those of missing children

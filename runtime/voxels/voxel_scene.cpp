@@ -6,6 +6,7 @@
 #include "compress/format/voxels/proxy_section.h"
 #include "pbrt_import/scene/flattening.h"
 #include "runtime/voxels/field_tracer.h"
+#include "runtime/voxels/proxy_reach.h"
 #include "runtime/voxels/voxel_tracer.h"
 
 namespace packtrace {
@@ -76,6 +77,8 @@ VoxelScene::VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)
   constexpr uint32_t kNone = ~0u;
   std::vector<uint32_t> proxy_of(file.geometries().size(), kNone);
   for (size_t i = 0; i < proxies_.size(); ++i) proxy_of[proxies_[i].record.geometry] = static_cast<uint32_t>(i);
+  std::vector<ProxyReach> reaches;
+  for (const Proxy& proxy : proxies_) reaches.emplace_back(proxy);
   std::vector<Bounds> boxes;
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
     const uint32_t number = proxy_of[file.instances()[i].geometry];
@@ -92,11 +95,7 @@ VoxelScene::VoxelScene(const BakedFile& file, const std::function<bool(uint32_t)
     }
     const VoxelFrame frame = proxies_[number].frame();
     const DAffine world_from_grid = compose(world_from_object, grid_placement(frame));
-    Bounds box;
-    for (int c = 0; c < 8; ++c)
-      box.extend(transform_point(
-          world_from_grid, DVec3((c & 1) * frame.size[0], (c >> 1 & 1) * frame.size[1], (c >> 2) * frame.size[2])));
-    boxes.push_back(box);
+    boxes.push_back(reaches[number].bounds(world_from_grid));
     placed_.push_back({i, number, inverse(world_from_grid), normal_matrix(world_from_grid)});
   }
   tree_ = ThingTree(boxes);

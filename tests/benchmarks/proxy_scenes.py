@@ -213,6 +213,7 @@ def main():
     parser.add_argument("shapes", nargs="*", default=list(SHAPES))
     parser.add_argument("--layouts", default="field"), parser.add_argument("--voxels", default="16,32")
     parser.add_argument("--pixels", default="8"), parser.add_argument("--size", default="240x135")
+    parser.add_argument("--surface", default="matched"), parser.add_argument("--error", default="0.01")
     parser.add_argument("--frames", type=int, default=3), parser.add_argument("--pairs", type=int, default=3)
     parser.add_argument("--levels", help="bounds of --lod-error, in pixels, to compare with")
     options = parser.parse_args()
@@ -225,8 +226,9 @@ def main():
             scene = write_scene(options.folder, shape, layout)
             for n in options.voxels.split(","):
                 file = scene.with_suffix(f".{n}.ptk")
-                runner.call("bake", scene, "-o", file, "--proxy", "voxels", "--proxy-voxels", n)
-                runner.row(f"{shape}, {layout}, {n}^3", file, ["--proxy-beyond", options.pixels])
+                runner.call("bake", scene, "-o", file, "--proxy", "voxels", "--proxy-voxels", n, "--proxy-surface",
+                            options.surface)
+                runner.row(f"{shape}, {layout}, {n}^3", file, ["--proxy-beyond", options.pixels, "--proxy-error", options.error])
             if options.levels:
                 file = scene.with_suffix(".lod.ptk")
                 runner.call("bake", scene, "-o", file, "--lod", "instanced")

@@ -1,5 +1,7 @@
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -60,16 +62,17 @@ TEST(VoxelScene, RaysMeetTheInstancesWhereTheirSurfacesAre) {
 TEST(VoxelScene, TheFirstHitOfManyIsTheNearest) {
   const BakedFile file = baked_balls(40);
   const VoxelScene all(file);
+  std::vector<std::unique_ptr<VoxelScene>> single;
+  for (uint32_t i = 0; i < 40; ++i)
+    single.push_back(std::make_unique<VoxelScene>(file, [&](uint32_t instance) { return instance == i; }));
   test::Random random(3);
   uint64_t hits = 0;
   for (int r = 0; r < 400; ++r) {
     const DVec3 origin(random.uniform(-10, 170), random.uniform(-2, 2), random.uniform(-2, 2));
     const DVec3 direction(random.uniform(-1, 1), random.uniform(-0.2f, 0.2f), random.uniform(-0.2f, 0.2f));
     double nearest = kFar;
-    for (uint32_t i = 0; i < 40; ++i) {
-      const VoxelScene one(file, [&](uint32_t instance) { return instance == i; });
-      if (const auto hit = one.first_hit(origin, direction, 0.0, kFar)) nearest = std::min(nearest, hit->t);
-    }
+    for (const auto& one : single)
+      if (const auto hit = one->first_hit(origin, direction, 0.0, kFar)) nearest = std::min(nearest, hit->t);
     const auto hit = all.first_hit(origin, direction, 0.0, kFar);
     ASSERT_EQ(hit.has_value(), std::isfinite(nearest));
     ASSERT_EQ(all.occluded(origin, direction, 0.0, kFar), hit.has_value());
@@ -79,6 +82,31 @@ TEST(VoxelScene, TheFirstHitOfManyIsTheNearest) {
     }
   }
   EXPECT_GT(hits, 100u);
+}
+
+/// The tree's boxes of turned instances are tighter than their grids: no ray may lose a voxel for that.
+TEST(VoxelScene, TurnedInstancesHaveAllTheirVoxels) {
+  Scene scene = balls(0);
+  scene.instances.clear();
+  DAffine turned(1.0);
+  turned[0] = DVec3(0.8, 0.36, -0.48), turned[1] = DVec3(-0.6, 0.48, -0.64), turned[2] = DVec3(0.0, 0.8, 0.6);
+  for (uint32_t i = 0; i < 8; ++i)
+    scene.instances.push_back({0, Affine(compose(test::translation(DVec3(4.0 * i, 0, 0)), turned))});
+  BakeConfig config;
+  config.proxy.use = ProxyUse::kVoxels, config.proxy.voxels = 9;
+  const BakedFile file = BakedFile::from_bytes(test::bake(scene, config).bytes);
+  const VoxelScene voxels(file);
+  const Proxy& proxy = voxels.proxies().at(0);
+  const DVec3 step = proxy.record.edge * DVec3(1.0);
+  decode_occupancy(proxy.voxels).for_each([&](VoxelIndex v) {
+    for (uint32_t i = 0; i < 8; ++i)
+      for (const DVec3 way : {DVec3(1, 0.01, 0.02), DVec3(0.01, -1, 0.02), DVec3(0.02, 0.01, 1)}) {
+        // From just outside a corner of the voxel through its middle.
+        const DVec3 middle = proxy.frame().center(v), from = middle - 0.5001 * step * glm::sign(way);
+        const DAffine place(file.world_from_object(i));
+        EXPECT_TRUE(voxels.occluded(transform_point(place, from), transform_vector(place, middle - from), 0.0, 1.0));
+      }
+  });
 }
 
 TEST(VoxelScene, InstancesThatScalesNearZeroFlattenAreNotTraced) {
