@@ -4,7 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "pbrt_import/files/image_file.h"
 #include "pbrt_import/scene/albedo_texture.h"
@@ -50,7 +52,7 @@ public:
 
   /// Adds a whole row of 8-bit pixels, as add() and end_row() would.
   /// @tparam kChannels 3, or 1 for grey pixels
-  /// @param linear linear value of each sample value, not negative
+  /// @param linear linear value of each sample value, not negative; the same for all rows
   template <uint32_t kChannels>
   void add_row(uint32_t y, const uint8_t* pixels, const std::array<float, 256>& linear) {
     double sums[kChannels] = {};
@@ -65,10 +67,11 @@ public:
         map_at(x, y) += Vec3(linear[p[0]], linear[p[kChannels / 2]], linear[p[kChannels - 1]]);
       }
     if (want_colours_) {
+      if (coded_.empty())
+        for (const float value : linear) coded_.push_back(srgb8_of_linear(value));
       uint8_t* to = summary_.rgb.data() + static_cast<size_t>(y) * width_ * 3;
       for (uint32_t x = 0; x < width_; ++x)
-        for (uint32_t c = 0; c < 3; ++c)
-          *to++ = srgb8_of_linear(linear[pixels[x * kChannels + (kChannels == 1 ? 0 : c)]]);
+        for (uint32_t c = 0; c < 3; ++c) *to++ = coded_[pixels[x * kChannels + (kChannels == 1 ? 0 : c)]];
     }
     end_row();
   }
@@ -113,6 +116,7 @@ private:
   uint32_t width_;
   bool want_mask_, want_colours_, want_radiance_;
   std::optional<float> grey_cutoff_;
+  std::vector<uint8_t> coded_; ///< sRGB value of each sample value of add_row()
   DVec3 row_{0.0}, total_{0.0};
 };
 

@@ -83,6 +83,19 @@ Out convert(T value, bool normalized) {
 
 template <class T, class Out>
 void copy_as(const std::byte* from, size_t stride, const Layout& layout, uint64_t count, Out* to) {
+  if (layout.columns == 1 && stride == layout.rows * sizeof(T)) { // most accessors; the compiler vectorises this
+    const uint64_t values = count * layout.rows;
+    if constexpr (std::is_same_v<T, Out>) {
+      if (values > 0) std::memcpy(to, from, static_cast<size_t>(values) * sizeof(T));
+    } else {
+      for (uint64_t i = 0; i < values; ++i) {
+        T value;
+        std::memcpy(&value, from + i * sizeof(T), sizeof value);
+        to[i] = convert<T, Out>(value, layout.normalized);
+      }
+    }
+    return;
+  }
   for (uint64_t i = 0; i < count; ++i, from += stride)
     for (uint32_t column = 0; column < layout.columns; ++column)
       for (uint32_t row = 0; row < layout.rows; ++row) {

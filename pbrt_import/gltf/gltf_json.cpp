@@ -70,8 +70,12 @@ bool Value::flag() const {
 
 std::vector<double> Value::numbers(size_t count) const {
   if (size() != count) fail("does not have " + std::to_string(count) + " numbers");
-  std::vector<double> numbers;
-  for (size_t i = 0; i < count; ++i) numbers.push_back((*this)[i].number());
+  std::vector<double> numbers(count);
+  for (size_t i = 0; i < count; ++i) {
+    const nlohmann::json& value = (*json_)[i];
+    const bool sound = value.is_number() && std::isfinite(value.get<double>());
+    numbers[i] = sound ? value.get<double>() : (*this)[i].number(); // which throws
+  }
   return numbers;
 }
 

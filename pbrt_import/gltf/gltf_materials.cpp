@@ -226,8 +226,8 @@ void Materials::define(const Value& material, MaterialUse& use) {
                          : "a texture of emission counts as white: " + problem);
   }
   Vec3 means(1.0f); // of roughness in y, of metalness in z
-  if (const std::optional<Value> texture = base.find("metallicRoughnessTexture")) {
-    const std::string problem = problem_of([&] { means = image_average(*texture, false); });
+  if (const std::optional<Value> gloss = base.find("metallicRoughnessTexture")) {
+    const std::string problem = problem_of([&] { means = image_average(*gloss, false); });
     warn(problem.empty() ? "textures of metalness and roughness are reduced to their means"
                          : "a texture of metalness and roughness counts as white: " + problem);
   }

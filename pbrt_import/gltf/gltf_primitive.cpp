@@ -126,16 +126,16 @@ PosedFrames::Source frame_source(Document& document, const Value& mesh_value, co
 }
 
 /// Marks the vertices that the importer keeps: those of triangles with three different, finite corners.
-std::vector<uint8_t> used_vertices(const PrimitiveMesh& mesh, const std::vector<int32_t>& indices) {
+std::vector<uint8_t> used_vertices(const PrimitiveMesh& mesh, const std::vector<uint32_t>& indices) {
   std::vector<uint8_t> used(static_cast<size_t>(mesh.vertices), 0);
-  const auto finite = [&](int32_t v) {
-    const float* const p = mesh.positions.data() + 3 * static_cast<size_t>(v);
+  const auto finite = [&](uint32_t v) {
+    const float* const p = mesh.positions.data() + 3 * size_t{v};
     return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
   };
   for (size_t i = 0; i + 2 < indices.size(); i += 3) {
-    const int32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
+    const uint32_t a = indices[i], b = indices[i + 1], c = indices[i + 2];
     if (a == b || b == c || c == a || !finite(a) || !finite(b) || !finite(c)) continue;
-    for (const int32_t v : {a, b, c}) used[static_cast<size_t>(v)] = 1;
+    for (const uint32_t v : {a, b, c}) used[v] = 1;
   }
   return used;
 }
@@ -153,19 +153,18 @@ std::shared_ptr<const MeshFrames> frames_of(Document& document, const Value& pri
   return nullptr;
 }
 
-std::vector<int32_t> triangles_of(const PrimitiveMesh& mesh, Mode mode, const Value& primitive) {
-  const std::vector<uint32_t>& in = mesh.indices;
-  for (const uint32_t index : in)
-    if (index >= mesh.vertices) primitive.fail("has an index out of range");
-  std::vector<int32_t> out;
-  const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
-    for (const uint32_t index : {a, b, c}) out.push_back(static_cast<int32_t>(index));
-  };
+/// Corners of the triangles, three by three. Takes the mesh's indices.
+std::vector<uint32_t> triangles_of(PrimitiveMesh& mesh, Mode mode, const Value& primitive) {
+  std::vector<uint32_t> in = std::move(mesh.indices);
+  uint32_t largest = 0;
+  for (const uint32_t index : in) largest = std::max(largest, index);
+  if (!in.empty() && largest >= mesh.vertices) primitive.fail("has an index out of range");
   if (mode == Mode::kTriangles) {
     if (in.size() % 3 != 0) primitive.fail("has " + std::to_string(in.size()) + " corners, which are not triangles");
-    out.assign(in.begin(), in.end());
-    return out;
+    return in;
   }
+  std::vector<uint32_t> out;
+  const auto add = [&](uint32_t a, uint32_t b, uint32_t c) { out.insert(out.end(), {a, b, c}); };
   out.reserve(in.size() * 3);
   for (size_t i = 0; i + 2 < in.size(); ++i) {
     if (mode == Mode::kFan)
@@ -176,7 +175,7 @@ std::vector<int32_t> triangles_of(const PrimitiveMesh& mesh, Mode mode, const Va
       add(in[i], in[i + 2], in[i + 1]);
   }
   // Equal neighbours connect strips; their triangles have no area.
-  std::vector<int32_t> kept;
+  std::vector<uint32_t> kept;
   kept.reserve(out.size());
   for (size_t i = 0; i < out.size(); i += 3)
     if (out[i] != out[i + 1] && out[i + 1] != out[i + 2] && out[i] != out[i + 2])
@@ -250,7 +249,7 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
   morph(document, primitive, morph_weights(mesh_value, primitive, pose.weights), mesh);
   if (pose.skinned()) move_with_joints(*pose.joints, mesh.joints, mesh.positions, mesh.normals);
   // Draco's decoder turns strips into triangles.
-  const std::vector<int32_t> indices = triangles_of(mesh, draco ? Mode::kTriangles : Mode{mode}, primitive);
+  const std::vector<uint32_t> indices = triangles_of(mesh, draco ? Mode::kTriangles : Mode{mode}, primitive);
   if (indices.empty()) return;
   convert_uvs(mesh.uvs, use);
   std::shared_ptr<const MeshFrames> frames;
@@ -275,7 +274,7 @@ void add_gltf_primitive(Document& document, const Materials& materials, const Va
     feed.floats(ParameterType::kPoint3, "P", mesh.positions);
     if (!mesh.normals.empty()) feed.floats(ParameterType::kNormal, "N", mesh.normals);
     if (!mesh.uvs.empty()) feed.floats(ParameterType::kFloat, "uv", mesh.uvs);
-    feed.integers("indices", indices);
+    feed.integers("indices", {reinterpret_cast<const int32_t*>(indices.data()), indices.size()}); // below 2^31
     if (const std::optional<std::vector<int32_t>> lattice = lattice_of(document, mesh_value, primitive, pose.skinned()))
       feed.integers("lattice", *lattice);
     if (frames) feed.deforms({0, frames, pose.frames->frames_per_second, 0});
