@@ -210,7 +210,7 @@ run(tool("gltfpack"), "-i", at("portable.glb"), "-o", at("gltfpack.glb"), "-cc",
 for (const codec of ["meshopt", "draco"])
   run(tool("gltf-transform"), "optimize", at("portable.glb"), at(`transform_${codec}.glb`), "--compress", codec, "--texture-compress", "webp", "--simplify", "false");
 const reference = await vertices(at("portable.glb"), false), reach = 4 * step;
-const kMaxLost = 0.001;
+const kMaxLost = 0.001, kMaxAngle = 3; // degrees: what bakes of coarse lattices allow, with 8 bits of the codec
 const measure = async (ending) => {
   const test = await vertices(at(ending), true), near = errors(reference, test, step, reach);
   return near.lost < kMaxLost ? near : errors(reference, test, step, 16 * reach, 2000); // instances may be further away
@@ -246,6 +246,8 @@ console.log(`${name}: steps of ${step.toPrecision(3)}, packtrace ${own.toPrecisi
 for (const ending of files) {
   const file = at(`${ending}.glb`), e = measured[ending] ?? (await measure(`${ending}.glb`));
   check(e.lost <= kMaxLost, `${name}.${ending} has its vertices`, `${(100 * e.lost).toFixed(2)} % are not within ${(16 * reach).toPrecision(3)}`);
+  if (ending === "web" || ending === "exchange")
+    check(e.normal_max <= kMaxAngle, `${name}.${ending} keeps its normals`, `one is off by ${e.normal_max.toFixed(2)} degrees where triangles keep their area`);
   const psnr = await imagePsnr(at("portable.glb"), file);
   const parts = Object.entries(streams(file)).map(([use, bytes]) => `${use} ${(bytes / 1000).toFixed(0)}`);
   console.log(`${ending}: ${(bytesOf(file) / 1000).toFixed(0)} kB (${parts.join(", ")}); position ${(e.position_rms / step).toFixed(2)}, ` +
