@@ -1,6 +1,7 @@
 // Compares the voxels of a baked file with an on/off grid of NanoVDB: bytes, and rays per second, over the same voxels
 // and rays; and their bits with those of a pointerless octree. Usage: packtrace_voxel_benchmark FILE.ptk [RAYS]; the
-// file is baked with --proxy voxels.
+// file is baked with --proxy voxels. For a file of --proxy sdf, builds the distance fields again and counts the samples
+// that jump flooding has wrong.
 
 #include <algorithm>
 #include <bit>
@@ -16,6 +17,8 @@
 #include <nanovdb/util/Ray.h>
 #include <openvdb/openvdb.h>
 
+#include "compress/bake/proxies/geometry_field.h"
+#include "compress/bake/proxies/occluding_triangles.h"
 #include "compress/format/voxels/cell_pyramid.h"
 #include "compress/format/voxels/proxy_codec.h"
 #include "compress/format/voxels/proxy_section.h"
@@ -115,6 +118,20 @@ void compare(const Proxy& proxy, size_t ray_count) {
       static_cast<unsigned long long>(different));
 }
 
+void count_repairs(const BakedFile& file, const Proxy& proxy) {
+  const uint32_t g = proxy.record.geometry;
+  ProxyConfig config;
+  config.use = ProxyUse::kField, config.field_bits = proxy.field.header().sample_bits;
+  config.voxels = std::ranges::max(proxy.field.size()) - 2 * voxels::kFieldMargin;
+  const GeometryField built = build_field(occluding_triangles(file, g, material_runs(file.sections())[g]), config,
+                                          MemoryBudget(), "a geometry");
+  const VoxelIndex& size = built.field.size();
+  std::printf("{\"size\": [%u, %u, %u], \"band_samples\": %llu, \"repaired\": %llu, \"repaired_share\": %.3f}\n",
+              size[0], size[1], size[2], static_cast<unsigned long long>(built.band_samples),
+              static_cast<unsigned long long>(built.repaired),
+              static_cast<double>(built.repaired) / static_cast<double>(built.band_samples));
+}
+
 } // namespace
 } // namespace packtrace
 
@@ -126,7 +143,10 @@ int main(int count, char** arguments) {
     const std::span<const uint8_t> bytes = packtrace::proxy_bytes(file);
     if (bytes.empty()) throw std::runtime_error("the file has no proxies; bake it with --proxy voxels");
     for (const packtrace::Proxy& proxy : packtrace::read_proxies(bytes))
-      packtrace::compare(proxy, count > 2 ? std::stoul(arguments[2]) : 1000000);
+      if (proxy.is_field())
+        packtrace::count_repairs(file, proxy);
+      else
+        packtrace::compare(proxy, count > 2 ? std::stoul(arguments[2]) : 1000000);
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
