@@ -30,7 +30,8 @@ GBuffer make_room(ImageSize size, float motion) {
       } else {
         g.view_z[i] = 10.0f, g.normal[i] = Vec3(0, 0, -1), g.instance[i] = 0;
       }
-      g.motion_px[i] = Vec2(motion * 30.0f / g.view_z[i], 0.0f);
+      const float moved = motion * 30.0f / g.view_z[i];
+      g.motion_px[i] = Vec2(moved, 0.3f * moved);
     }
   }
   if (motion != 0.0f) g.previous_z = g.view_z;

@@ -18,6 +18,11 @@ inline float reciprocal_root(float x) {
   return r * (1.5f - 0.5f * x * r * r);
 }
 
+inline F32 reciprocal_root(F32 x) {
+  const F32 r = (F32)(0x5f375a86 - ((I32)x >> 1));
+  return r * (1.5f - 0.5f * x * r * r);
+}
+
 /// The surfaces at some pixels.
 struct Surfaces {
   F32 disparity;
@@ -266,63 +271,97 @@ void sum_along_row(int width, const float* in, float* __restrict out) {
 }
 
 /// log2 and exp2 of positive normal numbers, without library calls, so that all instruction sets give the same bits.
-inline float log2_of(float x) {
-  const int32_t bits = __builtin_bit_cast(int32_t, x);
-  const float exponent = static_cast<float>((bits >> 23) - 127);
-  const float m = __builtin_bit_cast(float, (bits & 0x7fffff) | 0x3f800000) - 1.0f;
+inline F32 log2_of(F32 x) {
+  const F32 exponent = as_floats(((I32)x >> 23) - 127);
+  const F32 m = (F32)(((I32)x & 0x7fffff) | 0x3f800000) - 1.0f;
   // Error below 2e-4 on [0, 1].
   return exponent + m * (1.4418256f + m * (-0.7057096f + m * (0.41450846f + m * (-0.19365396f + m * 0.04303296f))));
 }
-inline float exp2_of(float x) { // of x in [-100, 0]
-  const float whole = static_cast<float>(static_cast<int>(x) - 1);
-  const float f = x - whole; // in (0, 1]
-  const float m = 1.0f + f * (0.6951786f + f * (0.2276186f + f * 0.0772028f));
-  return m * __builtin_bit_cast(float, (static_cast<int32_t>(whole) + 127) << 23);
+inline F32 exp2_of(F32 x) { // of x in [-100, 0]
+  const I32 whole = truncated(x) - 1;
+  const F32 f = x - as_floats(whole); // in (0, 1]
+  const F32 m = 1.0f + f * (0.6951786f + f * (0.2276186f + f * 0.0772028f));
+  return m * (F32)((whole + 127) << 23);
+}
+
+/// The window around some pixels.
+class WindowOfPixels {
+public:
+  WindowOfPixels(const MomentWindow& rows, int x) : rows_(rows), x_(x), counts_(truncated(sum(&MomentRows::counts))) {}
+
+  F32 sum(float* MomentRows::* moments) const {
+    F32 total{};
+    for (const MomentRows& row : rows_) total += load(row.*moments + x_);
+    return total;
+  }
+  F32 count() const { return greater(as_floats(counts_ & 31), all(1.0f)); }
+  F32 with_spread() const { return as_floats((counts_ >> 5) & 31); }
+  F32 with_decay() const { return as_floats(counts_ >> 10); }
+
+private:
+  const MomentWindow& rows_;
+  int x_;
+  I32 counts_;
+};
+
+/// Variances of a sample at some pixels.
+/// @param own mean square minus squared mean
+inline F32 spread_of(const WindowOfPixels& window, F32 n, F32 own, const VarianceTerms& t) {
+  const F32 with_spread = window.with_spread(), divisor = greater(with_spread, all(1.0f));
+  const F32 spreads = window.sum(&MomentRows::spread);
+  // The mean of the variance around, with weight prior, and the pixel's own.
+  const auto mixed = [&](F32 around) {
+    return (t.prior * around + own * n * divisor) / ((t.prior + n - 1.0f) * divisor);
+  };
+  const float young = t.moving ? 4.0f : 2.0f;
+  const bool means = t.per_sample < 1.0f;
+  if (!means && !any((n < young) | (with_spread <= 0.0f))) return mixed(spreads);
+  const F32 count = window.count(), value = window.sum(&MomentRows::value);
+  const F32 squares = window.sum(&MomentRows::square);
+  const F32 space = greater(squares * count - value * value, all(0.0f)) / (count * greater(count - 1.0f, all(1.0f)));
+  F32 spread = select(n < 2.0f, space, mixed(select(with_spread > 0.0f, spreads, space)));
+  if (t.moving) spread = select(n < young, greater(spread, 0.5f * space), spread);
+  if (!means) return spread;
+  const F32 mean = value / count;
+  return lesser(spread, mean * (1.0f - mean) * t.most_spread);
+}
+
+/// Variances of the means of n stratified samples, times n / spread, where the law of still pixels holds.
+inline F32 still_ratio(const WindowOfPixels& window, F32 n, F32 spread, const VarianceTerms& t) {
+  F32 factor = all(t.still_factor);
+  const F32 with_decay = window.with_decay();
+  if (t.stratified && any(with_decay > 0.0f)) {
+    const F32 measured = t.ratio_prior * t.still_factor * spread + window.sum(&MomentRows::decay);
+    factor = select((with_decay > 0.0f) & (spread > 0.0f), measured / ((t.ratio_prior + with_decay) * spread), factor);
+  }
+  return factor * exp2_of(-t.still_power * log2_of(n));
 }
 
 void variance_row(int width, const HistoryOfRow& history, const MomentWindow& window, const VarianceTerms& terms,
-                  float* __restrict estimate, const FirstRow& first) {
+                  float* estimate, const FirstRow& first) {
   const HistoryOfRow h = history;
-  const MomentWindow rows = window;
   const VarianceTerms t = terms;
   const FirstRow o = first;
-  const float young_moving = t.moving ? 4.0f : 0.0f, longest_moving = t.moving ? t.longest_moving : 0.0f;
-  const bool means = t.per_sample < 1.0f;
-#pragma GCC ivdep
-  for (int x = 0; x < width; ++x) {
-    const float a = h.mean[x], n = greater(h.samples[x], 1.0f);
-    float counts = 0.0f, value = 0.0f, squares = 0.0f, spreads = 0.0f, decay = 0.0f;
-    for (const MomentRows& r : rows)
-      counts += r.counts[x], value += r.value[x], squares += r.square[x], spreads += r.spread[x], decay += r.decay[x];
-    const int packed = static_cast<int>(counts);
-    const float count = greater(static_cast<float>(packed & 31), 1.0f);
-    const float spread_seen = static_cast<float>((packed >> 5) & 31), decay_seen = static_cast<float>(packed >> 10);
-    const float space = greater(squares * count - value * value, 0.0f) / (count * greater(count - 1.0f, 1.0f));
-    const float own = greater(moment_of(h.square[x]) - a * a, 0.0f) * n; // (n - 1) s2
-    // The mean of the variance around, with weight prior, and the pixel's own.
-    const float around = spread_seen > 0.0f ? spreads : space, divisor = greater(spread_seen, 1.0f);
-    float spread = (t.prior * around + own * divisor) / ((t.prior + n - 1.0f) * divisor);
-    spread = n < 2.0f ? space : spread;
-    spread = n < young_moving ? greater(spread, 0.5f * space) : spread;
-    const float mean = value / count;
-    spread = means ? lesser(spread, mean * (1.0f - mean) * t.most_spread) : spread;
-    const float measured = t.ratio_prior * t.still_factor * spread + decay;
-    const float factor =
-        t.stratified & (spread > 0.0f) ? measured / ((t.ratio_prior + decay_seen) * spread) : t.still_factor;
-    const float still = factor * exp2_of(-t.still_power * log2_of(n));
-    const float moving = t.moving_base + t.moving_gain * n;
-    const float ratio = lesser(n <= longest_moving ? moving : still, 1.0f);
-    const float share = 1.0f / n, v = spread * (n < 2.0f ? 1.0f : ratio) * share;
-    const float sample_share = share * t.per_sample;
-    const bool seen = h.samples[x] > 0.0f;
-    estimate[x] = seen ? v : 0.0f;
-    const float told =
-        seen ? v * (1.0f + sample_share * (t.young + t.distrust * sample_share)) : kMaxVariance * (1.0f + t.distrust);
-    const float root = reciprocal_root(2.0f * t.tolerance * told + 1e-6f);
-    const float precision = lesser(greater(kPrecisionUnits * root + 0.5f, 1.0f), kMostPrecision);
-    o.value[x] = in_ao_units(a);
-    o.precision[x] = static_cast<uint16_t>(static_cast<int>(h.disparity[x] > 0.0f ? precision : 0.0f));
-    o.lone[x] = static_cast<uint16_t>(static_cast<int>(8192.0f * (kLoneBase + kLoneYoung * sample_share)));
+  const float longest_moving = t.moving ? t.longest_moving : 0.0f;
+  for (int x = 0; x < width; x += kFloats) {
+    const WindowOfPixels around(window, x);
+    const F32 a = load(h.mean + x), samples = load(h.samples + x), n = greater(samples, all(1.0f));
+    const F32 own = greater(moments_of(load_wide(h.square + x)) - a * a, all(0.0f));
+    const F32 spread = spread_of(around, n, own, t);
+    F32 ratio = t.moving_base + t.moving_gain * n;
+    if (any(n > longest_moving)) ratio = select(n <= longest_moving, ratio, still_ratio(around, n, spread, t));
+    ratio = select(n < 2.0f, all(1.0f), lesser(ratio, all(1.0f)));
+    const F32 share = 1.0f / n, v = spread * ratio * share, sample_share = share * t.per_sample;
+    const I32 seen = samples > 0.0f;
+    store(estimate + x, select(seen, v, all(0.0f)));
+    const F32 told = select(seen, v * (1.0f + sample_share * (t.young + t.distrust * sample_share)),
+                            all(kMaxVariance * (1.0f + t.distrust)));
+    const F32 root = reciprocal_root(2.0f * t.tolerance * told + 1e-6f);
+    const F32 precision = lesser(greater(kPrecisionUnits * root + 0.5f, all(1.0f)), all(kMostPrecision));
+    const F32 bounded = lesser(greater(all(0.0f), a), all(1.0f)); // in_ao_units()
+    store_words(o.value + x, truncated(bounded * float{kAoUnits} + 0.5f));
+    store_words(o.precision + x, truncated(select(load(h.disparity + x) > 0.0f, precision, all(0.0f))));
+    store_words(o.lone + x, truncated(8192.0f * (kLoneBase + kLoneYoung * sample_share)));
   }
 }
 

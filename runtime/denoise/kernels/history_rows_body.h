@@ -67,92 +67,105 @@ void locate_row(int width, const MovingRow& row, const LocateTerms& terms, const
 /// The difference between Catmull-Rom and linear interpolation between a and b, where before and after are the outer
 /// neighbours: -t (1 - t) / 2 times the linearly interpolated second differences at a and b.
 /// Source: R. Keys, "Cubic convolution interpolation for digital image processing", 1981, a = -1/2.
-inline float sharpening(float before, float a, float b, float after, float t) {
+inline F32 sharpening(F32 before, F32 a, F32 b, F32 after, F32 t) {
   return -0.5f * t * (1.0f - t) * ((1.0f - t) * (before - 2.0f * a + b) + t * (a - 2.0f * b + after));
 }
 
-inline int whole_runs(int width) { return (width + kRunPadding - 1) / kRunPadding * kRunPadding; }
+/// The surface that the history of some pixels must show.
+struct WantedSurfaces {
+  F32 disparity, tolerance;
+  I32 nx, ny, nz, instance;
 
-/// Linear interpolation. (With sharpen_run() in one loop, most variables would be in memory.)
+  WantedSurfaces(const WantedRow& w, int x)
+      : disparity(load(w.at.disparity + x)), tolerance(load(w.at.tolerance + x)), nx(load_wide(w.normal_x + x)),
+        ny(load_wide(w.normal_y + x)), nz(load_wide(w.normal_z + x)), instance(load(w.instance + x)) {}
+};
+
+/// Weighted sums of what the history has at the pixels around.
+struct HistorySums {
+  F32 weight{}, mean{}, square{}, fast{}, samples{};
+
+  /// Weighted by similarity: 0 for another surface, up to 1 for a perfect match.
+  /// @param ignored bits in which instances may differ
+  template <int kSquarings>
+  void add(const PreviousPixels& p, ptrdiff_t at, const WantedSurfaces& w, F32 bilinear, int32_t ignored) {
+    const F32 there = load(p.disparity + at), count = load(p.samples + at);
+    const F32 distance = magnitude(there - w.disparity);
+    const I32 dot =
+        load_wide(p.normal_x + at) * w.nx + load_wide(p.normal_y + at) * w.ny + load_wide(p.normal_z + at) * w.nz;
+    F32 cosine = lesser(greater(as_floats(dot) * (1.1f * kSquaredNormalUnit), all(0.0f)), all(1.0f));
+    for (int i = 0; i < kSquarings; ++i) cosine *= cosine;
+    const F32 agreement = w.tolerance / greater(distance, w.tolerance) * cosine;
+    const I32 differs = (load(p.instance + at) ^ w.instance) & ~ignored;
+    const I32 same = (there > 0.0f) & (count > 0.0f) & (distance <= 2.0f * w.tolerance) & (differs == 0);
+    const F32 part = select(same, bilinear * agreement, all(0.0f));
+    weight += part;
+    mean += part * load(p.mean + at);
+    square += part * as_floats(load_wide(p.square + at));
+    fast += part * as_floats(load_wide(p.fast + at));
+    samples += part * count;
+  }
+};
+
+/// Linear interpolation.
 /// @param weights sum of the weights, 0 where the history is rejected
 template <int kSquarings>
 void interpolate_run(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
-                     const PastRow& out, float* __restrict weights) {
+                     const PastRow& out, float* weights) {
   const PreviousPixels p = from;
   const WantedRow w = wanted;
   const PastRow o = out;
   const ptrdiff_t s = p.stride;
-  const uint32_t ignored = test_instances ? 0u : ~0u; // bits in which instances may differ
-  const int rounded = whole_runs(width);
-#pragma GCC ivdep
-  for (int x = 0; x < rounded; ++x) {
-    const float disparity = w.at.disparity[x], tolerance = w.at.tolerance[x];
-    const float fx = w.at.fraction_x[x], fy = w.at.fraction_y[x];
-    const int nx = w.normal_x[x], ny = w.normal_y[x], nz = w.normal_z[x];
-    const uint32_t instance = w.instance[x];
-    float weight = 0.0f, mean = 0.0f, square = 0.0f, fast = 0.0f, samples = 0.0f;
-    // Weighted by similarity: 0 for another surface, up to 1 for a perfect match.
-    const auto corner = [&](ptrdiff_t at, float bilinear) {
-      const float there = p.disparity[at], count = p.samples[at];
-      const float distance = std::abs(there - disparity);
-      const float dot = static_cast<float>(p.normal_x[at] * nx + p.normal_y[at] * ny + p.normal_z[at] * nz);
-      float cosine = lesser(greater(1.1f * kSquaredNormalUnit * dot, 0.0f), 1.0f);
-      for (int i = 0; i < kSquarings; ++i) cosine *= cosine;
-      const float agreement = tolerance / greater(distance, tolerance) * cosine;
-      const uint32_t differs = (p.instance[at] ^ instance) & ~ignored;
-      const bool same = (there > 0.0f) & (count > 0.0f) & (distance <= 2.0f * tolerance) & (differs == 0u);
-      const float part = same ? bilinear * agreement : 0.0f;
-      weight += part;
-      mean += part * p.mean[at];
-      square += part * static_cast<float>(static_cast<int>(p.square[at]));
-      fast += part * static_cast<float>(static_cast<int>(p.fast[at]));
-      samples += part * count;
+  const int32_t ignored = test_instances ? 0 : -1;
+  for (int x = 0; x < width; x += kFloats) {
+    const WantedSurfaces surfaces(w, x);
+    const F32 fx = load(w.at.fraction_x + x), fy = load(w.at.fraction_y + x);
+    HistorySums sums;
+    const auto corner = [&](ptrdiff_t at, F32 bilinear) {
+      if (any(bilinear > 0.0f)) sums.add<kSquarings>(p, at, surfaces, bilinear, ignored);
     };
     corner(x, (1.0f - fx) * (1.0f - fy));
     corner(x + 1, fx * (1.0f - fy));
     corner(x + s, (1.0f - fx) * fy);
     corner(x + s + 1, fx * fy);
-    const bool found = (weight > kMinHistoryWeight) & (disparity > 0.0f);
-    const float scale = found ? 1.0f / weight : 0.0f;
-    weights[x] = found ? weight : 0.0f;
-    o.mean[x] = lesser(mean * scale, 1.0f);
-    o.square[x] = square * scale * (1.0f / kMomentUnits);
-    o.fast[x] = fast * scale * (1.0f / kMomentUnits);
-    o.samples[x] = found ? lesser(samples, w.at.longest[x]) : 0.0f;
+    const I32 found = (sums.weight > kMinHistoryWeight) & (surfaces.disparity > 0.0f);
+    const F32 nothing{}, scale = select(found, 1.0f / sums.weight, nothing);
+    store(weights + x, select(found, sums.weight, nothing));
+    store(o.mean + x, lesser(sums.mean * scale, all(1.0f)));
+    store(o.square + x, sums.square * scale * (1.0f / kMomentUnits));
+    store(o.fast + x, sums.fast * scale * (1.0f / kMomentUnits));
+    store(o.samples + x, select(found, lesser(sums.samples, load(w.at.longest + x)), nothing));
   }
 }
 
 /// Bicubic interpolation of the mean, where its footprint and the eight neighbours that share edges with it lie on one
 /// surface: a hard test without normals.
 void sharpen_run(int width, const PreviousPixels& from, const WantedRow& wanted, const PastRow& out,
-                 const float* __restrict weights) {
+                 const float* weights) {
   const PreviousPixels p = from;
   const WantedRow w = wanted;
   const PastRow o = out;
   const ptrdiff_t s = p.stride;
-  const int rounded = whole_runs(width);
-#pragma GCC ivdep
-  for (int x = 0; x < rounded; ++x) {
-    const float disparity = w.at.disparity[x], tolerance = w.at.tolerance[x];
-    const float fx = w.at.fraction_x[x], fy = w.at.fraction_y[x];
-    const uint32_t instance = w.instance[x];
-    int same = 1;
+  for (int x = 0; x < width; x += kFloats) {
+    I32 same = load(weights + x) > kMinSharpenWeight;
+    if (!any(same)) continue;
+    const F32 disparity = load(w.at.disparity + x), tolerance = load(w.at.tolerance + x);
+    const F32 fx = load(w.at.fraction_x + x), fy = load(w.at.fraction_y + x);
+    const I32 instance = load(w.instance + x);
     const auto tap = [&](ptrdiff_t at) {
-      const bool alike =
-          (p.instance[at] == instance) & (p.samples[at] > 0.0f) & (std::abs(p.disparity[at] - disparity) <= tolerance);
-      same &= alike ? 1 : 0;
-      return p.mean[at];
+      same &= (load(p.instance + at) == instance) & (load(p.samples + at) > 0.0f) &
+              (magnitude(load(p.disparity + at) - disparity) <= tolerance);
+      return load(p.mean + at);
     };
-    const float m00 = tap(x), m10 = tap(x + 1), m01 = tap(x + s), m11 = tap(x + s + 1);
-    const float along_x = (1.0f - fy) * sharpening(tap(x - 1), m00, m10, tap(x + 2), fx) +
-                          fy * sharpening(tap(x + s - 1), m01, m11, tap(x + s + 2), fx);
-    const float along_y = (1.0f - fx) * sharpening(tap(x - s), m00, m01, tap(x + 2 * s), fy) +
-                          fx * sharpening(tap(x - s + 1), m10, m11, tap(x + 2 * s + 1), fy);
-    const bool sharpen = (same != 0) & (weights[x] > kMinSharpenWeight);
-    const float linear = o.mean[x];
-    const float sharp = lesser(greater(linear + (sharpen ? along_x + along_y : 0.0f), 0.0f), 1.0f);
-    o.mean[x] = sharp;
-    o.square[x] += (sharp - linear) * (sharp + linear); // keeps the variance
+    const F32 m00 = tap(x), m10 = tap(x + 1), m01 = tap(x + s), m11 = tap(x + s + 1);
+    const F32 along_x = (1.0f - fy) * sharpening(tap(x - 1), m00, m10, tap(x + 2), fx) +
+                        fy * sharpening(tap(x + s - 1), m01, m11, tap(x + s + 2), fx);
+    const F32 along_y = (1.0f - fx) * sharpening(tap(x - s), m00, m01, tap(x + 2 * s), fy) +
+                        fx * sharpening(tap(x - s + 1), m10, m11, tap(x + 2 * s + 1), fy);
+    const F32 linear = load(o.mean + x), nothing{};
+    const F32 sharp = lesser(greater(linear + select(same, along_x + along_y, nothing), nothing), all(1.0f));
+    store(o.mean + x, sharp);
+    store(o.square + x, load(o.square + x) + (sharp - linear) * (sharp + linear)); // keeps the variance
   }
 }
 

@@ -47,7 +47,13 @@ inline F32 load(const float* from) {
   std::memcpy(&v, from, sizeof(v));
   return v;
 }
+inline I32 load(const uint32_t* from) {
+  I32 v;
+  std::memcpy(&v, from, sizeof(v));
+  return v;
+}
 inline void store(float* to, F32 v) { std::memcpy(to, &v, sizeof(v)); }
+inline F32 select(I32 condition, F32 a, F32 b) { return condition ? a : b; }
 inline F32 as_floats(I32 v) { return __builtin_convertvector(v, F32); }
 inline I32 truncated(F32 v) { return __builtin_convertvector(v, I32); }
 inline void store(uint16_t* to, U16 v) { std::memcpy(to, &v, sizeof(v)); }
@@ -55,7 +61,7 @@ inline void store(int16_t* to, I16 v) { std::memcpy(to, &v, sizeof(v)); }
 
 // lesser, greater; average: of two lanes, rounded up; product: the upper half, which is the product of fractions in
 // units of 2^-16; part_of: the product of a fraction in units of 2^-15 and a value, rounded to nearest. load_wide:
-// of kFloats values; store_bytes: of values from 0 to 255.
+// of kFloats values; store_bytes, store_words: of values that fit; any: whether a comparison is true in any lane.
 #if defined(__AVX512BW__)
 inline U16 lesser(U16 a, U16 b) { return (U16)_mm512_min_epu16((__m512i)a, (__m512i)b); }
 inline U16 greater(U16 a, U16 b) { return (U16)_mm512_max_epu16((__m512i)a, (__m512i)b); }
@@ -72,6 +78,14 @@ inline F32 greater(F32 a, F32 b) { return (F32)_mm512_maskz_max_ps(kEach, (__m51
 inline F32 magnitude(F32 a) { return (F32)((I32)a & 0x7fffffff); }
 inline I32 load_wide(const int16_t* from) {
   return (I32)_mm512_maskz_cvtepi16_epi32(kEach, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
+}
+inline I32 load_wide(const uint16_t* from) {
+  return (I32)_mm512_maskz_cvtepu16_epi32(kEach, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
+}
+inline bool any(I32 condition) { return _mm512_test_epi32_mask((__m512i)condition, (__m512i)condition) != 0; }
+template <typename T>
+inline void store_words(T* to, I32 v) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm512_maskz_cvtepi32_epi16(kEach, (__m512i)v));
 }
 inline void store_bytes(uint8_t* to, I32 v) {
   _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm512_maskz_cvtepi32_epi8(kEach, (__m512i)v));
@@ -91,6 +105,15 @@ inline F32 greater(F32 a, F32 b) { return (F32)_mm256_max_ps((__m256)b, (__m256)
 inline F32 magnitude(F32 a) { return (F32)_mm256_andnot_ps(_mm256_set1_ps(-0.0f), (__m256)a); }
 inline I32 load_wide(const int16_t* from) {
   return (I32)_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+}
+inline I32 load_wide(const uint16_t* from) {
+  return (I32)_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+}
+inline bool any(I32 condition) { return _mm256_testz_si256((__m256i)condition, (__m256i)condition) == 0; }
+template <typename T>
+inline void store_words(T* to, I32 v) {
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to),
+                   _mm_packus_epi32(_mm256_castsi256_si128((__m256i)v), _mm256_extracti128_si256((__m256i)v, 1)));
 }
 inline void store_bytes(uint8_t* to, I32 v) {
   const __m128i words = _mm_packs_epi32(_mm256_castsi256_si128((__m256i)v), _mm256_extracti128_si256((__m256i)v, 1));
@@ -130,6 +153,20 @@ inline I32 load_wide(const int16_t* from) {
   I32 v{};
   for (int i = 0; i < kFloats; ++i) v[i] = from[i];
   return v;
+}
+inline I32 load_wide(const uint16_t* from) {
+  I32 v{};
+  for (int i = 0; i < kFloats; ++i) v[i] = from[i];
+  return v;
+}
+inline bool any(I32 condition) {
+  int32_t found = 0;
+  for (int i = 0; i < kFloats; ++i) found |= condition[i];
+  return found != 0;
+}
+template <typename T>
+inline void store_words(T* to, I32 v) {
+  for (int i = 0; i < kFloats; ++i) to[i] = static_cast<T>(v[i]);
 }
 inline void store_bytes(uint8_t* to, I32 v) {
   for (int i = 0; i < kFloats; ++i) to[i] = static_cast<uint8_t>(v[i]);
