@@ -160,11 +160,15 @@ class PassRowsSource final : public RowSource {
 public:
   /// @param step index of PairGuides::kSteps
   /// @param first of the first pass, in which lone samples give way: the source; else null
-  PassRowsSource(const Tile& tile, int kept, RowSource& source, size_t step, HistoryRows* first,
+  /// @param last nobody will read the precisions
+  PassRowsSource(const Tile& tile, int kept, RowSource& source, size_t step, HistoryRows* first, bool last,
                  const FilterKernels& kernels, const FluxConfig& config)
-      : RowSource(tile, kept), kernels_(kernels), terms_(patch_terms(config)), source_(source), first_(first),
-        step_index_(step), step_(PairGuides::kSteps[step]), scale_(width_, 4 * step_),
-        columns_(kPairOffsets.size(), RowRing<uint16_t>(width_, 1)),
+      : RowSource(tile, kept), kernels_(kernels),
+        exchange_(first != nullptr ? last ? kernels.exchange_only : kernels.exchange_first
+                  : last           ? kernels.exchange_last
+                                   : kernels.exchange),
+        terms_(patch_terms(config)), source_(source), first_(first), step_index_(step), step_(PairGuides::kSteps[step]),
+        scale_(width_, 4 * step_), columns_(kPairOffsets.size(), RowRing<uint16_t>(width_, 1)),
         distance_(kPairOffsets.size(), RowRing<uint16_t>(width_, 4, terms_.no_distance)),
         weights_(kPairOffsets.size(), RowRing<uint16_t>(width_, 4 * step_)) {}
 
@@ -184,8 +188,7 @@ private:
     const PassRows rows{source_.value(y), source_.value(y - step_), source_.value(y + step_), source_.precision(y),
                         scale(y),         scale(y - step_),         scale(y + step_),         pairs(y),
                         pairs(y - step_)};
-    (first_ != nullptr ? kernels_.exchange_first : kernels_.exchange)(width_, step_, rows, value_.row(y),
-                                                                      precision_.row(y));
+    exchange_(width_, step_, rows, value_.row(y), precision_.row(y));
   }
 
   void weigh(int y) {
@@ -221,6 +224,7 @@ private:
   }
 
   const FilterKernels& kernels_;
+  FilterKernels::Exchange* const exchange_;
   const PatchTerms terms_;
   RowSource& source_;
   HistoryRows* const first_;
@@ -247,7 +251,7 @@ public:
     for (uint32_t i = 0; i < config.passes; ++i) {
       const int kept = i + 1 < config.passes ? kept_for(kPasses[i + 1]) : 1;
       passes_.push_back(std::make_unique<PassRowsSource>(tile, kept, *source, kPasses[i], i == 0 ? &history_ : nullptr,
-                                                         kernels, config));
+                                                         i + 1 == config.passes, kernels, config));
       source = passes_.back().get();
     }
     result_ = source;

@@ -32,12 +32,23 @@ void derive_diagonals(int width, const std::array<float*, 4>& rise) {
   for (int x = 0; x < width; ++x) down_right[x] = right[x] + down[x], down_left[x] = down[x] - right[x];
 }
 
+/// Computes SurfaceRow::normal_xy and normal_z.
+PACKTRACE_AVX2_CLONES
+void pair_normals(int width, const int16_t* nx, const int16_t* ny, const int16_t* nz, uint32_t* __restrict xy,
+                  uint32_t* __restrict z) {
+  for (int x = 0; x < width; ++x) {
+    xy[x] = static_cast<uint32_t>(static_cast<uint16_t>(nx[x])) | static_cast<uint32_t>(ny[x]) << 16;
+    z[x] = static_cast<uint16_t>(nz[x]);
+  }
+}
+
 /// Guide weights of consecutive rows, as one thread computes them.
 class GuideRows {
 public:
   GuideRows(const Guides& guides, const GuideTerms& terms, const FilterKernels& kernels)
       : guides_(guides), terms_(terms), kernels_(kernels), width_(static_cast<int>(guides.size.width)),
-        height_(static_cast<int>(guides.size.height)), rise_(four<float>(guides.size.width)), lone_(guides.size.width),
+        height_(static_cast<int>(guides.size.height)), rise_(four<float>(guides.size.width)),
+        normal_xy_(guides.size.width), normal_z_(guides.size.width), lone_(guides.size.width),
         near_(four<uint8_t>(guides.size.width)), far_(four<uint8_t>(guides.size.width)) {}
 
   /// Starts anew at row y.
@@ -68,9 +79,8 @@ private:
   SurfaceRow surface(int y) {
     return {guides_.disparity.row(y),
             {rise_[0].row(y), rise_[1].row(y), rise_[2].row(y), rise_[3].row(y)},
-            guides_.normal_x.row(y),
-            guides_.normal_y.row(y),
-            guides_.normal_z.row(y)};
+            normal_xy_.row(y),
+            normal_z_.row(y)};
   }
 
   static PairRow pairs(Four<uint8_t>& rings, int y) {
@@ -79,12 +89,17 @@ private:
     return rows;
   }
 
+  void derive(int y) {
+    const Plane<float>& disparity = guides_.disparity;
+    derive_row(width_, disparity.row(y - 1), disparity.row(y), disparity.row(y + 1), rise_[0].row(y), rise_[1].row(y));
+    derive_diagonals(width_, rows_of(rise_, y));
+    pair_normals(width_, guides_.normal_x.row(y), guides_.normal_y.row(y), guides_.normal_z.row(y), normal_xy_.row(y),
+                 normal_z_.row(y));
+  }
+
   void find_lone(int y) {
     for (; next_near_ <= y; ++next_near_) {
-      for (; next_derived_ <= std::min(next_near_ + 1, height_ - 1); ++next_derived_)
-        derive_row(width_, guides_.disparity.row(next_derived_ - 1), guides_.disparity.row(next_derived_),
-                   guides_.disparity.row(next_derived_ + 1), rise_[0].row(next_derived_), rise_[1].row(next_derived_)),
-            derive_diagonals(width_, rows_of(rise_, next_derived_));
+      for (; next_derived_ <= std::min(next_near_ + 1, height_ - 1); ++next_derived_) derive(next_derived_);
       kernels_.guide(width_, 1, surface(next_near_), surface(next_near_ + 1), terms_, rows_of(near_, next_near_));
     }
     kernels_.lone_guide(width_, pairs(near_, y), pairs(near_, y - 1), guides_.disparity.row(y), lone_.row(y));
@@ -96,6 +111,7 @@ private:
   int width_, height_;
   int next_derived_ = 0, next_near_ = 0, next_lone_ = 0;
   Four<float> rise_; ///< of the disparity
+  KeptRows<uint32_t> normal_xy_, normal_z_;
   KeptRows<uint8_t> lone_;
   Four<uint8_t> near_, far_; ///< weights of the pairs one pixel apart, and of those farther apart, not raised
 };

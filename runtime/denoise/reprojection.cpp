@@ -93,8 +93,8 @@ PastRow ReprojectionRows::at(const MotionFrame& frame, int y) {
 void ReprojectionRows::look_nearby(const MotionFrame& frame, int y) {
   const Guides &now = frame.guides, &then = frame.previous.guides;
   const History& h = frame.previous.history;
-  for (int x = 0; x < width_; ++x) {
-    if (weights_[x] > kLostWeight || !(located_.disparity[x] > 0.0f)) continue;
+  const auto next = [&](int x) { return kernels_.next_lost(x, width_, weights_, located_.disparity); };
+  for (int x = next(0); x < width_; x = next(x + 1)) {
     const LostSurface lost{located_.disparity[x],  located_.tolerance[x],  now.normal_x.row(y)[x],
                            now.normal_y.row(y)[x], now.normal_z.row(y)[x], now.instance.row(y)[x]};
     // The square is centred at the footprint's nearest pixel. It stays within the borders of the planes.

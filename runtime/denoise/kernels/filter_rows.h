@@ -40,7 +40,8 @@ inline constexpr uint16_t kMostDeviations = 240;
 struct SurfaceRow {
   const float* disparity;
   std::array<const float*, 4> rise; ///< change of the disparity along each of kPairOffsets
-  const int16_t *nx, *ny, *nz;      ///< in kNormalUnit
+  /// Normals in kNormalUnit as pairs of signed 16-bit numbers: x in the lower and y in the upper half; z and 0.
+  const uint32_t *normal_xy, *normal_z;
 };
 
 /// Least guide weight, of 255, of two pixels that both hit something.
@@ -164,9 +165,9 @@ struct FilterKernels {
   void (*normalise)(int width, int step, const WeightRow& here, const WeightRow& above, uint16_t* scale);
   void (*normalise_first)(int width, int step, const WeightRow& here, const WeightRow& above, const uint16_t* lone,
                           uint16_t* scale);
-  /// Moves AO between the pixels of pairs.
+  /// Moves AO between the pixels of pairs. The last pass, which may be the first one, leaves the precisions alone.
   using Exchange = void(int width, int step, const PassRows& rows, int16_t* value, uint16_t* precision);
-  Exchange *exchange, *exchange_first;
+  Exchange *exchange, *exchange_first, *exchange_last, *exchange_only;
   /// Moments of single pixels.
   void (*moments)(int width, const float* mean, const uint16_t* square, const float* samples, const uint32_t* trend,
                   const MomentRows& out);

@@ -26,11 +26,11 @@ inline F32 reciprocal_root(F32 x) {
 /// The surfaces at some pixels.
 struct Surfaces {
   F32 disparity;
-  I32 nx, ny, nz;
+  I32 normal_xy, normal_z;
 };
 
 inline Surfaces load(const SurfaceRow& row, int at) {
-  return {load(row.disparity + at), load_wide(row.nx + at), load_wide(row.ny + at), load_wide(row.nz + at)};
+  return {load(row.disparity + at), load(row.normal_xy + at), load(row.normal_z + at)};
 }
 
 /// Guide weights of pairs of pixels in one direction. All lengths are divided by the number of pixels that they are
@@ -46,7 +46,7 @@ inline I32 guide_weights(const Surfaces& p, F32 rise_p, const Surfaces& q, F32 r
   const F32 allowed = least + lesser(magnitude(rise_p), magnitude(rise_q)) * t.slope +
                       lesser(magnitude(rise_p - rise_q) * t.bend, least * kMostBend) + 1e-37f * scale;
   const F32 depth = greater(all(0.0f), 1.0f - distance / allowed);
-  const I32 dot = p.nx * q.nx + p.ny * q.ny + p.nz * q.nz;
+  const I32 dot = sum_of_products(p.normal_xy, q.normal_xy) + sum_of_products(p.normal_z, q.normal_z);
   F32 cosine = lesser(greater(as_floats(dot) * kSquaredNormalUnit, all(0.0f)), all(1.0f));
   cosine *= cosine, cosine *= cosine, cosine *= cosine;
   const F32 weight = greater(depth * depth * cosine * 255.0f + 0.5f, all(float{kMinGuide}));
@@ -213,7 +213,8 @@ void raise_precisions(int width, const uint16_t* variance, const uint16_t* befor
 }
 
 /// @tparam kFirst the scale is in units of 2^-13, not 2^-15
-template <bool kFirst>
+/// @tparam kLast nobody reads the precisions
+template <bool kFirst, bool kLast>
 void exchange_row(int width, int step, const PassRows& rows, int16_t* value, uint16_t* precision) {
   const PassRows r = rows;
   for (int x = 0; x < width; x += kLanes) {
@@ -226,8 +227,7 @@ void exchange_row(int width, int step, const PassRows& rows, int16_t* value, uin
       U16 u = product(weight, lesser(scale, load(q_scale)));
       if (kFirst) u <<= 2;
       flux += part_of(u, load(q) - own);
-      taken += u;
-      squares += product(u, u);
+      if (!kLast) taken += u, squares += product(u, u);
     };
     pair(weights.right, r.value + x + step, r.scale + x + step);
     pair(weights.left, r.value + x - step, r.scale + x - step);
@@ -239,9 +239,9 @@ void exchange_row(int width, int step, const PassRows& rows, int16_t* value, uin
     pair(weights.up_right, r.value_above + x + step, r.scale_above + x + step);
     store(value + x, own + flux);
     const U16 kept = 32768 - taken;
-    store(precision + x, product(kept, kept) + squares);
+    if (!kLast) store(precision + x, product(kept, kept) + squares);
   }
-  raise_precisions(width, precision, r.precision, precision);
+  if (!kLast) raise_precisions(width, precision, r.precision, precision);
 }
 
 /// MomentRows::counts; windows have fewer than 32 pixels.
@@ -382,10 +382,22 @@ void finish_row(int width, const int16_t* value, const float* mean, const float*
   }
 }
 
-constexpr FilterKernels kKernels = {guide_row,          lone_guide_row, raise_guides_row,    compare_row,
-                                    weigh_row,          normalise_row,  normalise_first_row, exchange_row<false>,
-                                    exchange_row<true>, moments_row,    sum_along_row,       variance_row,
-                                    any_to_fill,        finish_row};
+constexpr FilterKernels kKernels = {guide_row,
+                                    lone_guide_row,
+                                    raise_guides_row,
+                                    compare_row,
+                                    weigh_row,
+                                    normalise_row,
+                                    normalise_first_row,
+                                    exchange_row<false, false>,
+                                    exchange_row<true, false>,
+                                    exchange_row<false, true>,
+                                    exchange_row<true, true>,
+                                    moments_row,
+                                    sum_along_row,
+                                    variance_row,
+                                    any_to_fill,
+                                    finish_row};
 
 } // namespace
 } // namespace packtrace

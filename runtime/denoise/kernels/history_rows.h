@@ -124,6 +124,9 @@ struct HistoryKernels {
                       const PastRow& out, float* weights),
              kMaxNormalSquarings + 1>
       resample;
+  /// The first pixel from x on, before `width`, that lost its history; or `width`.
+  /// @param weights of the footprints
+  int (*next_lost)(int x, int width, const float* weights, const float* disparity);
   /// Converts a row of moments from units of 1 / kMomentUnits.
   void (*unpack)(int width, const uint16_t* moments, float* out);
   /// Adds samples to a row of the history, perhaps in place.

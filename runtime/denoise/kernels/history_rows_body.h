@@ -178,6 +178,18 @@ void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted
   if (between > 0.0f) sharpen_run(width, from, wanted, out, weights);
 }
 
+int next_lost(int x, int width, const float* weights, const float* disparity) {
+  const auto lost = [&](int at) { return (weights[at] <= kLostWeight) & (disparity[at] > 0.0f); };
+  while (x < width) {
+    const int end = x + kFloats < width ? x + kFloats : width;
+    if (any((load(weights + x) <= kLostWeight) & (load(disparity + x) > 0.0f)))
+      for (; x < end; ++x)
+        if (lost(x)) return x;
+    x = end;
+  }
+  return width;
+}
+
 void unpack_row(int width, const uint16_t* moments, float* __restrict out) {
   for (int x = 0; x < width; ++x) out[x] = moment_of(moments[x]);
 }
@@ -307,6 +319,7 @@ template <int... kPowers>
 constexpr HistoryKernels history_table(std::integer_sequence<int, kPowers...>) {
   return {locate_row,
           {resample_run<kPowers>...},
+          next_lost,
           unpack_row,
           accumulate_row,
           keep_trends_row,

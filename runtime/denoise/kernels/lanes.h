@@ -61,7 +61,8 @@ inline void store(int16_t* to, I16 v) { std::memcpy(to, &v, sizeof(v)); }
 
 // lesser, greater; average: of two lanes, rounded up; product: the upper half, which is the product of fractions in
 // units of 2^-16; part_of: the product of a fraction in units of 2^-15 and a value, rounded to nearest. load_wide:
-// of kFloats values; store_bytes, store_words: of values that fit; any: whether a comparison is true in any lane.
+// of kFloats values; store_bytes, store_words: of values that fit; any: whether a comparison is true in any lane;
+// sum_of_products: of both 16-bit halves.
 #if defined(__AVX512BW__)
 inline U16 lesser(U16 a, U16 b) { return (U16)_mm512_min_epu16((__m512i)a, (__m512i)b); }
 inline U16 greater(U16 a, U16 b) { return (U16)_mm512_max_epu16((__m512i)a, (__m512i)b); }
@@ -82,6 +83,7 @@ inline I32 load_wide(const int16_t* from) {
 inline I32 load_wide(const uint16_t* from) {
   return (I32)_mm512_maskz_cvtepu16_epi32(kEach, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
 }
+inline I32 sum_of_products(I32 a, I32 b) { return (I32)_mm512_madd_epi16((__m512i)a, (__m512i)b); }
 inline bool any(I32 condition) { return _mm512_test_epi32_mask((__m512i)condition, (__m512i)condition) != 0; }
 template <typename T>
 inline void store_words(T* to, I32 v) {
@@ -109,6 +111,7 @@ inline I32 load_wide(const int16_t* from) {
 inline I32 load_wide(const uint16_t* from) {
   return (I32)_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
 }
+inline I32 sum_of_products(I32 a, I32 b) { return (I32)_mm256_madd_epi16((__m256i)a, (__m256i)b); }
 inline bool any(I32 condition) { return _mm256_testz_si256((__m256i)condition, (__m256i)condition) == 0; }
 template <typename T>
 inline void store_words(T* to, I32 v) {
@@ -159,6 +162,7 @@ inline I32 load_wide(const uint16_t* from) {
   for (int i = 0; i < kFloats; ++i) v[i] = from[i];
   return v;
 }
+inline I32 sum_of_products(I32 a, I32 b) { return ((a << 16) >> 16) * ((b << 16) >> 16) + (a >> 16) * (b >> 16); }
 inline bool any(I32 condition) {
   int32_t found = 0;
   for (int i = 0; i < kFloats; ++i) found |= condition[i];
