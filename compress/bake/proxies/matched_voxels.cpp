@@ -20,7 +20,8 @@ class ParallelLines {
 public:
   /// @param number of the direction, 0..kDirections - 1, of a spiral over half the sphere
   ParallelLines(VoxelIndex size, int number) : top_(size[0], size[1], size[2]) {
-    const double z = (number + 0.5) / kDirections, r = std::sqrt(1.0 - z * z), turn = 2.399963229728653 * number;
+    const double z = (number + 0.5) / kDirections, r = std::sqrt(1.0 - z * z),
+                 turn = 2.399963229728653 * (number + 0.5);
     along_ = DVec3(r * std::cos(turn), r * std::sin(turn), z);
     right_ = glm::normalize(glm::cross(along_, DVec3(1.0, 0.0, 0.0)));
     up_ = glm::cross(along_, right_);
