@@ -15,19 +15,21 @@ namespace packtrace {
 namespace {
 
 constexpr const char* kNoColours = "colours of triangles are left out";
-constexpr size_t kHeaderBytes = 84, kRecordBytes = 50; // 80 bytes of text, a count; a normal, three corners, 16 bits
+constexpr size_t kBinaryHeaderBytes = 84,
+                 kRecordBytes = 50; // 80 bytes of text, a count; a normal, three corners, 16 bits
 
 /// Triangles claimed by the header of a binary file.
 uint32_t claimed_triangles(std::string_view content) {
   uint32_t count;
-  std::memcpy(&count, content.data() + kHeaderBytes - sizeof count, sizeof count);
+  std::memcpy(&count, content.data() + kBinaryHeaderBytes - sizeof count, sizeof count);
   return count;
 }
 
 /// Binary files may begin with "solid" as well, so the size decides first.
 bool is_binary(std::string_view content) {
-  if (content.size() >= kHeaderBytes && (content.size() - kHeaderBytes) / kRecordBytes == claimed_triangles(content) &&
-      (content.size() - kHeaderBytes) % kRecordBytes == 0)
+  if (content.size() >= kBinaryHeaderBytes &&
+      (content.size() - kBinaryHeaderBytes) / kRecordBytes == claimed_triangles(content) &&
+      (content.size() - kBinaryHeaderBytes) % kRecordBytes == 0)
     return true;
   TextLines lines(content);
   if (!lines.next()) return true;
@@ -36,23 +38,23 @@ bool is_binary(std::string_view content) {
 
 /// Whether a record's last 16 bits, which several programs fill with colours, are not 0.
 bool has_colours(std::string_view content) {
-  for (size_t at = kHeaderBytes; content.size() - at >= kRecordBytes; at += kRecordBytes)
+  for (size_t at = kBinaryHeaderBytes; content.size() - at >= kRecordBytes; at += kRecordBytes)
     if (content[at + kRecordBytes - 1] != 0 || content[at + kRecordBytes - 2] != 0) return true;
   return false;
 }
 
 /// Three points per triangle.
 std::vector<Vec3> read_binary(std::string_view content, MemoryReservation& memory) {
-  if (content.size() < kHeaderBytes)
+  if (content.size() < kBinaryHeaderBytes)
     throw Error(ErrorKind::kInput, "neither a text that begins with \"solid\" nor long enough for a binary STL file");
   const uint32_t count = claimed_triangles(content);
-  if ((content.size() - kHeaderBytes) / kRecordBytes < count)
+  if ((content.size() - kBinaryHeaderBytes) / kRecordBytes < count)
     throw Error(ErrorKind::kInput, "the file is truncated: it is too short for the " + std::to_string(count) +
                                        " triangles that it claims");
   memory.resize(uint64_t{count} * 3 * sizeof(Vec3), "the STL file's triangles");
   std::vector<Vec3> corners(size_t{count} * 3);
   for (size_t i = 0; i < count; ++i) {
-    const char* const record = content.data() + kHeaderBytes + i * kRecordBytes + sizeof(Vec3);
+    const char* const record = content.data() + kBinaryHeaderBytes + i * kRecordBytes + sizeof(Vec3);
     std::memcpy(&corners[3 * i], record, 3 * sizeof(Vec3));
   }
   return corners;

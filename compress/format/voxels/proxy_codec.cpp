@@ -47,7 +47,8 @@ private:
 std::optional<std::string_view> record_fault(const ProxyRecord& r, uint64_t geometry_count) {
   if (r.geometry >= geometry_count) return "geometry";
   if (r.kind >= kProxyKinds) return "kind";
-  if ((r.flags & ~kProxyFlags) != 0 || (r.flags & (kThin | kMatched)) == (kThin | kMatched)) return "flags";
+  constexpr uint32_t kTwoRules = voxels::kThin | voxels::kMatched;
+  if ((r.flags & ~kProxyFlags) != 0 || (r.flags & kTwoRules) == kTwoRules) return "flags";
   for (const double o : r.origin)
     if (!std::isfinite(o)) return "origin";
   if (!(r.edge > 0.0) || !std::isfinite(r.edge * kMaxGridSize)) return "edge";
