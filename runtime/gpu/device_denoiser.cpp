@@ -150,9 +150,9 @@ void DeviceDenoiser::State::allocate(uint32_t new_width, uint32_t new_height) {
     buffer = Buffer();
     buffer = Buffer(device, bytes, BufferPlace::kDevice, what);
   };
-  for (Past& past : past) {
-    on_device(past.guides, kGuideBytes * n, "guides"), on_device(past.history, kHistoryBytes * n, "the history");
-    on_device(past.rest, kRestBytes * n, "moments and trends");
+  for (Past& frame : past) {
+    on_device(frame.guides, kGuideBytes * n, "guides"), on_device(frame.history, kHistoryBytes * n, "the history");
+    on_device(frame.rest, kRestBytes * n, "moments and trends");
   }
   on_device(samples, kSampleBytes * n, "changes of samples"), on_device(pair_guides, kPairBytes * n, "guide weights");
   on_device(changes, 8, "flags");
