@@ -47,6 +47,8 @@ std::function<Camera(uint64_t)> turning(const Camera& camera, DVec3 pivot, DVec3
   return [=](uint64_t picture) { return orbited(camera, pivot, up, degrees * static_cast<double>(picture) / steps); };
 }
 
+bool is_orbit(std::string_view path) { return path == "orbit" || path.starts_with("orbit:"); }
+
 double orbit_degrees(std::string_view path) {
   if (path == "orbit") return 360.0;
   const std::string_view digits = path.substr(std::string_view("orbit:").size());
@@ -121,6 +123,15 @@ void validate(const SequenceOptions& options) {
     throw Error(ErrorKind::kUsage, "--start-time: must be finite");
 }
 
+double start_time(const SequenceOptions& options, const SceneMotion* motion) {
+  return options.start_time.value_or(motion != nullptr ? motion->begin_s() : 0.0);
+}
+
+bool begins_with_still_camera(const SequenceOptions& options, uint32_t index, const SceneMotion* motion) {
+  if (is_orbit(*options.path)) return true;
+  return *options.path == "scene" && (motion == nullptr || !motion->camera(index, start_time(options, motion)));
+}
+
 Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> pictures, const SceneSource& source,
                        const Camera& camera, std::optional<uint32_t> index, FrameLoop& loop,
                        const MemoryBudget& memory) {
@@ -128,7 +139,7 @@ Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> p
   sequence.fps = options.fps.value_or(sequence.fps);
   sequence.subframes = options.subframes.value_or(sequence.subframes);
   const SceneMotion* const motion = loop.scene().motion;
-  sequence.start_s = options.start_time.value_or(motion != nullptr ? motion->begin_s() : 0.0);
+  sequence.start_s = start_time(options, motion);
   if (pictures && (*pictures < 1 || *pictures > kMaxPictures))
     throw Error(ErrorKind::kUsage,
                 fmt::format("--frames {}: a sequence has 1 to {} pictures", *pictures, kMaxPictures));
@@ -147,7 +158,7 @@ Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> p
   } else if (path == "turntable") {
     const Camera framing = framing_camera(source.world_bounds(), loop.config().size, source.cameras());
     sequence.camera = turning(framing, source.world_bounds().centre(), up, 360.0, sequence.pictures);
-  } else if (path == "orbit" || path.starts_with("orbit:")) {
+  } else if (is_orbit(path)) {
     const double degrees = orbit_degrees(path);
     const DVec3 forward = glm::normalize(DVec3(camera.world_from_camera[2]));
     const DVec3 pivot =

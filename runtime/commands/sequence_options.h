@@ -31,6 +31,14 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options);
 /// Throws Error(kUsage) for values out of range, and for options that require --path.
 void validate(const SequenceOptions& options);
 
+/// When the first picture is shown, unless a file of camera keys says otherwise, in seconds.
+/// @param motion null if nothing moves
+double start_time(const SequenceOptions& options, const SceneMotion* motion);
+
+/// Whether a camera of the scene that does not move begins the path. Then one that sees nothing is replaced.
+/// @param index its number in the scene
+bool begins_with_still_camera(const SequenceOptions& options, uint32_t index, const SceneMotion* motion);
+
 /// The pictures of a sequence.
 struct Sequence {
   uint64_t pictures = 0;

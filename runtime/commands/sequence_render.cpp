@@ -148,6 +148,18 @@ std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first
   return rows;
 }
 
+/// Frames the whole scene if its own camera, with which the path begins, sees nothing of it.
+void replace_blind_camera(RenderSetup& setup, const RenderOptions& options, const GlobalOptions& globals,
+                          Progress& progress) {
+  FrameLoop& loop = *setup.loop;
+  const SceneMotion* const motion = loop.scene().motion;
+  if (options.camera || !setup.camera.index || !begins_with_still_camera(options.sequence, *setup.camera.index, motion))
+    return;
+  const bool seen = loop.next_frame(setup.camera.camera, start_time(options.sequence, motion), progress).seen;
+  loop.reset();
+  if (!seen) setup.camera = frame_whole_scene(setup.camera, *setup.loaded.source, setup.config.size, options, globals);
+}
+
 void check_sequence(const RenderOptions& options, const SequenceOutputs& outputs, const JsonOutput& json,
                     const DetailConfig& detail) {
   if (options.ground_truth) throw Error(ErrorKind::kUsage, "--ground-truth renders stills; it does not go with --path");
@@ -173,6 +185,7 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
   Progress progress(display.observer());
   RenderSetup setup(options, globals, detail, outputs.layers(), progress, display);
   const Sequence sequence = with_file(options.input, [&] {
+    replace_blind_camera(setup, options, globals, progress);
     return make_sequence(options.sequence, options.frames, *setup.loaded.source, setup.camera.camera,
                          setup.camera.index, *setup.loop, globals.memory);
   });

@@ -276,6 +276,33 @@ TEST(CameraOfAScene, ThatSeesNothingGivesWayToOneThatFramesTheScene) {
   }
 }
 
+TEST(CameraOfAScene, IsReplacedInSequencesToo) {
+  const Workbench bench;
+  const std::string scene = bench / "scene.pbrt";
+  write_text(scene, ball_scene(kAway));
+  for (const std::string path : {"orbit:30", "scene"}) {
+    const auto render = [&](const std::string& name, const std::vector<std::string>& options) {
+      std::vector<std::string> command{"render", scene, "--path", path, "--frames", "2", "--subframes", "1", "--force"};
+      command.insert(command.end(), {"-o", bench / (name + "%d.png")});
+      command.insert(command.end(), options.begin(), options.end());
+      return run_packtrace(command);
+    };
+    const CommandResult result = render("own", {});
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_TRUE(contains(result.err, "warning: camera 0 sees nothing of the scene; showing the whole scene"))
+        << result.err;
+    const CommandResult framed = render("auto", {"--camera", "auto", "--size", "32x24"});
+    EXPECT_FALSE(contains(framed.err, "warning")) << framed.err;
+    const CommandResult kept = render("kept", {"--camera", "0"});
+    EXPECT_FALSE(contains(kept.err, "warning")) << kept.err;
+    for (const char* const number : {"0.png", "1.png"}) {
+      const std::string own = read_text(bench / (std::string("own") + number));
+      EXPECT_EQ(own, read_text(bench / (std::string("auto") + number)));
+      EXPECT_NE(own, read_text(bench / (std::string("kept") + number)));
+    }
+  }
+}
+
 TEST(CameraOfAScene, ThatWasAskedForStays) {
   const Workbench bench;
   write_text(bench / "scene.pbrt", ball_scene(kAway));
