@@ -334,12 +334,12 @@ void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const Rep
     report(Severity::kWarning, 0, std::to_string(too_short) + " faces have fewer than three corners: ignored");
 }
 
-/// Reports colours, which pbrt ignores as well.
+/// Notes colours. pbrt ignores them, so a scene may have them without a warning.
 void report_colours(const PlyHeader& header, const ReportFn& report) {
   for (const std::string_view element : {kVertices, kFaces})
     for (const std::string_view red : {"red", "diffuse_red", "r"})
       if (const PlyElement* const found = header.find(element); report && found && found->find(red, false))
-        report(Severity::kWarning, 0, "colours of the element '" + std::string(element) + "' are left out");
+        report(Severity::kNote, 0, "colours of the element '" + std::string(element) + "' are left out");
 }
 
 template <class Source>
