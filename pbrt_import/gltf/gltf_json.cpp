@@ -91,7 +91,8 @@ double Value::number_or(const char* key, double fallback) const {
 
 std::string Value::text_or(const char* key, std::string fallback) const {
   const std::optional<Value> found = find(key);
-  return found ? found->text() : std::move(fallback);
+  if (found) return found->text();
+  return fallback;
 }
 
 std::vector<double> Value::numbers_or(const char* key, std::vector<double> fallback) const {

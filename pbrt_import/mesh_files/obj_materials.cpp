@@ -44,7 +44,7 @@ void define_texture(const MtlMaterial& material, std::string_view use, std::stri
 std::string define_diffuse(const MtlMaterial& material, DirectiveFeed& feed) {
   if (material.diffuse_map.file.empty()) return {};
   define_texture(material, "image", "spectrum", material.diffuse_map, feed);
-  const std::string image = texture_name(material, "image");
+  std::string image = texture_name(material, "image");
   const Vec3 factor = material.diffuse.value_or(Vec3(1.0f));
   if (factor == Vec3(1.0f) || factor == Vec3(0.0f)) return image;
   const std::string product = texture_name(material, "diffuse");
