@@ -83,7 +83,8 @@ Out convert(T value, bool normalized) {
 
 template <class T, class Out>
 void copy_as(const std::byte* from, size_t stride, const Layout& layout, uint64_t count, Out* to) {
-  if (layout.columns == 1 && stride == layout.rows * sizeof(T)) { // most accessors; the compiler vectorises this
+  // Contiguous, as in most files; the compiler vectorises this.
+  if (layout.columns == 1 && stride == layout.rows * sizeof(T)) {
     const uint64_t values = count * layout.rows;
     if constexpr (std::is_same_v<T, Out>) {
       if (values > 0) std::memcpy(to, from, static_cast<size_t>(values) * sizeof(T));

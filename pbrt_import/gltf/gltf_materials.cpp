@@ -164,7 +164,7 @@ float Materials::index_of(const Value& material) {
   return static_cast<float>((1.0 + root) / (1.0 - root));
 }
 
-/// Says what nothing below reads.
+/// Warns of material properties that the import ignores.
 void Materials::report_losses(const Value& material) {
   if (material.has("normalTexture")) warn("normal maps are left out: surfaces keep the normals of their vertices");
   if (material.has("occlusionTexture")) warn("textures of occlusion are left out: occlusion is computed");

@@ -31,11 +31,11 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options);
 /// Throws Error(kUsage) for values out of range, and for options that require --path.
 void validate(const SequenceOptions& options);
 
-/// When the first picture is shown, unless a file of camera keys says otherwise, in seconds.
+/// Time of the first picture in seconds, unless a file of camera keys sets it.
 /// @param motion null if nothing moves
 double start_time(const SequenceOptions& options, const SceneMotion* motion);
 
-/// Whether a camera of the scene that does not move begins the path. Then one that sees nothing is replaced.
+/// Whether the path starts with a camera of the scene that does not move. If it sees nothing, `render` replaces it.
 /// @param index its number in the scene
 bool begins_with_still_camera(const SequenceOptions& options, uint32_t index, const SceneMotion* motion);
 

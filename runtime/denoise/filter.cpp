@@ -160,7 +160,7 @@ class PassRowsSource final : public RowSource {
 public:
   /// @param step index of PairGuides::kSteps
   /// @param first of the first pass, in which lone samples give way: the source; else null
-  /// @param last nobody will read the precisions
+  /// @param last whether this is the last pass, whose precisions are never read
   PassRowsSource(const Tile& tile, int kept, RowSource& source, size_t step, HistoryRows* first, bool last,
                  const FilterKernels& kernels, const FluxConfig& config)
       : RowSource(tile, kept), kernels_(kernels),

@@ -6,9 +6,9 @@
 
 namespace packtrace {
 
-/// How much ambient occlusion changes if its rays see proxies: the mean absolute difference at up to 256 pixels that
-/// hit something, spread evenly over the picture, from 128 rays each, the same for both tracers. The result depends on
-/// scene, view and parameters only.
+/// Mean absolute difference of ambient occlusion between rays that see proxies and rays that see triangles. It is
+/// measured at up to 256 pixels that hit something, evenly spread over the picture, with the same 128 rays per pixel
+/// for both tracers. Deterministic.
 /// @param exact, proxies tracers of the source's instances
 /// @param seen G-buffer of `exact`
 /// @return 0 if no pixel hits anything

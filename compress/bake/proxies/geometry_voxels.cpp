@@ -48,7 +48,7 @@ DVec3 vec(const LatticePoint& p) {
   return DVec3(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
 }
 
-/// A number of 0..1 that depends on a voxel without any order.
+/// A hash of a voxel's index, in [0, 1).
 double any_of(VoxelIndex v) {
   uint32_t hash = v[0] * 0x8da6b343u ^ v[1] * 0xd8163841u ^ v[2] * 0xcb1ab31fu;
   hash = (hash ^ hash >> 15) * 0x2c1b3c6du;
@@ -158,8 +158,8 @@ private:
     result_.filled = true;
   }
 
-  /// Keeps voxels from the inside outwards until they hide as many lines as the triangles do: those whose centres are
-  /// deepest inside a closed surface, or nearest to an open one.
+  /// Selects voxels until they block as many lines as the triangles do. Voxels whose centres are deepest inside a
+  /// closed surface, or nearest to an open one, come first.
   void match() {
     const VoxelSet surface = result_.set;
     result_.set = source_.closed ? inside_voxels(source_, config_.voxels) : VoxelSet(grid_.size);
@@ -212,7 +212,7 @@ private:
   }
 
   /// Distances in lattice steps from the centres of a set's voxels to the nearest of the triangles that set them.
-  /// @param slots of these triangles, if wanted
+  /// @param slots receives the material slot of each voxel's nearest triangle; may be null
   std::vector<float> center_distances(const VoxelSet& set, const VoxelNumbers& numbers,
                                       std::vector<uint32_t>* slots = nullptr) const {
     const double edge = grid_.edge_steps();
@@ -278,7 +278,7 @@ private:
     }
   }
 
-  static constexpr double kTieBreak = 1.0 / 64.0; // voxels; so that of equally deep ones some can be chosen
+  static constexpr double kTieBreak = 1.0 / 64.0; // in voxels; breaks ties between equally deep voxels
   static constexpr float kNoDistance = std::numeric_limits<float>::infinity(); // inside: no triangle sets the voxel
 
   const BakedFile& file_;

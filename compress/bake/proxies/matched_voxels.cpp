@@ -15,7 +15,7 @@ constexpr float kNever = std::numeric_limits<float>::infinity();
 constexpr int kDirections = 48;
 constexpr double kSpacing = 0.5, kMostLines = 64.0; // voxels; along a side of each direction's lines
 
-/// Parallel lines through a grid, a square lattice across their direction.
+/// Parallel lines through a grid, spaced on a square lattice perpendicular to their direction.
 class ParallelLines {
 public:
   /// @param number of the direction, 0..kDirections - 1, of a spiral over half the sphere
@@ -64,7 +64,7 @@ public:
       }
   }
 
-  /// The least depth of the voxels that a line crosses.
+  /// Smallest depth among the voxels that a line crosses.
   float least_depth(int x, int y, const std::function<float(VoxelIndex)>& depth) const {
     const glm::dvec2 at = low_ + spacing_ * (glm::dvec2(x, y) + 0.5);
     const DVec3 origin = at.x * right_ + at.y * up_;
@@ -107,7 +107,7 @@ private:
 
 float matching_depth(const LineScene& scene) {
   size_t wanted = 0;
-  std::vector<float> depths; // of all lines that meet a voxel which may be chosen
+  std::vector<float> depths; // one for each line that crosses a selectable voxel
   for (int number = 0; number < kDirections; ++number) {
     const ParallelLines lines(scene.size, number);
     std::vector<uint8_t> met(static_cast<size_t>(lines.width()) * static_cast<size_t>(lines.height()));

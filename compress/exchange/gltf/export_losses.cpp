@@ -10,7 +10,7 @@
 namespace packtrace {
 namespace {
 
-/// Whether the window's middle is not that of the image.
+/// Whether the screen window is off-centre.
 bool is_shifted(const Camera& camera) {
   if (!camera.screen_window) return false;
   constexpr double kTolerance = 1e-6; // of the window's size
@@ -19,7 +19,7 @@ bool is_shifted(const Camera& camera) {
          std::abs(w.z + w.w) > kTolerance * std::abs(w.w - w.z);
 }
 
-/// Whether a surface has more than a colour and the kind that the flags state.
+/// Whether a surface has shading parameters besides its colour and material flags.
 bool has_parameters(const SurfaceShading& s) {
   return s.specular != Vec3(0.0f) || s.emits() || s.transmits() || s.roughness != 0.0f || s.sigma != 0.0f ||
          s.metal_k != Vec3(0.0f);

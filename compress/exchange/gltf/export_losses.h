@@ -8,17 +8,17 @@
 
 namespace packtrace {
 
-/// Formats whose exports leave things out.
+/// Export formats that cannot hold all data of a baked file.
 enum class ExportFormat { kGltf, kPbrt, kObj, kStreams };
 
-/// Settings of a glTF file that decide what it keeps.
+/// glTF export settings that decide which data is kept.
 struct GltfKeeps {
   bool levels = false;       ///< levels of detail
   bool transmission = false; ///< KHR_materials_transmission
 };
 
-/// Something of a baked file that an export leaves out or changes. Errors of codecs, motion and what depends on the
-/// exporter's choices (GltfReport, SceneReport) are reported apart.
+/// A kind of data that an export drops or changes, and how often. GltfReport and SceneReport hold codec errors, motion
+/// and losses that depend on the exporter's choices.
 struct ExportLoss {
   std::string_view key;  ///< in JSON: docs/json_output.md
   std::string_view what; ///< completes "12 ...", with a plural noun

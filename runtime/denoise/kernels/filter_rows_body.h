@@ -213,7 +213,7 @@ void raise_precisions(int width, const uint16_t* variance, const uint16_t* befor
 }
 
 /// @tparam kFirst the scale is in units of 2^-13, not 2^-15
-/// @tparam kLast nobody reads the precisions
+/// @tparam kLast whether this is the last pass, whose precisions are never read
 template <bool kFirst, bool kLast>
 void exchange_row(int width, int step, const PassRows& rows, int16_t* value, uint16_t* precision) {
   const PassRows r = rows;
@@ -309,7 +309,7 @@ private:
 inline F32 spread_of(const WindowOfPixels& window, F32 n, F32 own, const VarianceTerms& t) {
   const F32 with_spread = window.with_spread(), divisor = greater(with_spread, all(1.0f));
   const F32 spreads = window.sum(&MomentRows::spread);
-  // The mean of the variance around, with weight prior, and the pixel's own.
+  // Blends the neighbourhood's variance, with weight `prior`, and the pixel's own variance.
   const auto mixed = [&](F32 around) {
     return (t.prior * around + own * n * divisor) / ((t.prior + n - 1.0f) * divisor);
   };

@@ -125,7 +125,7 @@ struct HistoryKernels {
              kMaxNormalSquarings + 1>
       resample;
   /// The first pixel from x on, before `width`, that lost its history; or `width`.
-  /// @param weights of the footprints
+  /// @param weights total weight of each pixel in its resampled footprint, as resample() leaves it
   int (*next_lost)(int x, int width, const float* weights, const float* disparity);
   /// Converts a row of moments from units of 1 / kMomentUnits.
   void (*unpack)(int width, const uint16_t* moments, float* out);
@@ -134,7 +134,7 @@ struct HistoryKernels {
                      const PastRow& past, const HistoryRow& history, const SampleRow& samples);
   /// Trends of a resampled row, in place: pixels that did not move keep theirs, unless their history was lost.
   /// @param motion x and y of each pixel's motion in pixels
-  /// @param weights of the footprints
+  /// @param weights total weight of each pixel in its resampled footprint, as resample() leaves it
   void (*keep_trends)(int width, const float* motion, const float* samples, const float* weights, uint32_t* trend);
   /// Whether a pixel's sample made its history, shorter than `longest`, reach or cross a power of two.
   bool (*any_crosses)(int width, const float* valid, const float* samples, float longest);

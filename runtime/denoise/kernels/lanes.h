@@ -7,10 +7,10 @@
 #include <immintrin.h>
 #endif
 
-/// Vectors as wide as those of the instruction set that the including file is compiled for. GCC 12 vectorises plain
-/// loops of 16-bit products with 32 bits; and plain loops over types of several widths take as many pixels at a time as
-/// the narrowest type has lanes, so that most variables are in memory. Local to each file, because every instruction
-/// set compiles them.
+/// Vectors as wide as those of the instruction set for which the including file is compiled. Plain loops are slower:
+/// GCC 12 widens 16-bit products to 32 bits, and in loops over types of several widths it processes one vector of the
+/// narrowest type at a time, which spills most variables to memory. The functions have internal linkage, because each
+/// instruction set compiles its own.
 namespace packtrace {
 namespace {
 
@@ -73,7 +73,7 @@ inline U16 magnitude(I16 a) { return (U16)_mm512_abs_epi16((__m512i)a); }
 inline U16 load_bytes(const uint8_t* from) {
   return (U16)_mm512_cvtepu8_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
 }
-constexpr __mmask16 kEach = 0xffff; // GCC 12 takes the forms without a mask for uses of uninitialised values
+constexpr __mmask16 kEach = 0xffff; // GCC 12 wrongly warns of uninitialised values in the unmasked forms
 inline F32 lesser(F32 a, F32 b) { return (F32)_mm512_maskz_min_ps(kEach, (__m512)b, (__m512)a); }
 inline F32 greater(F32 a, F32 b) { return (F32)_mm512_maskz_max_ps(kEach, (__m512)b, (__m512)a); }
 inline F32 magnitude(F32 a) { return (F32)((I32)a & 0x7fffffff); }

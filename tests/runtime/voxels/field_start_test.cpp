@@ -37,8 +37,8 @@ BakedFile fields_of(const std::vector<Grid>& grids) {
 DAffine moved(double scale, DVec3 by) { return compose(test::translation(by), test::scaling(DVec3(scale))); }
 
 TEST(FieldStart, RaysOfCoarseVoxelsDoNotStartBeyondFinerInstances) {
-  // A ground of 8 x 8 with voxels of 0.5, drawn 0.3 above itself, and a roof of 1 x 1 at 0.45: rays that started 0.45
-  // above the drawn ground for the roof too would pass it.
+  // The ground of 8 x 8 has voxels of 0.5, so its field is hit 0.3 above it, and its clearance is 0.45. With this
+  // clearance, rays would start above the roof of 1 x 1 at height 0.45 and miss it.
   const BakedFile file =
       fields_of({{moved(8.0, {-4, -4, 0}), {DVec3(0.0)}}, {moved(1.0, {-0.5, -0.5, 0.45}), {DVec3(0.0)}}});
   const VoxelScene scene(file);
