@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "pbrt_import/scene/world_view.h"
@@ -14,6 +13,7 @@
 #include "runtime/frame/still.h"
 #include "runtime/trace/source/packed_source.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/thread_cpu_time.h"
 
 namespace packtrace {
@@ -184,17 +184,17 @@ void compare(const std::string& file, const Options& options) {
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app(
+  BenchmarkOptions command_line(
       "Compares rates, resolutions, samplers and sorting of occlusion rays by CPU time of one thread and by the "
       "error of the denoised picture");
-  app.add_option("FILE", options.files, ".ptk files")->required();
-  app.add_option("--mode", options.modes, "Modes to compare (default: all)")->delimiter(',');
-  app.add_option("--width", options.width)->capture_default_str();
-  app.add_option("--height", options.height)->capture_default_str();
-  app.add_option("--repeats", options.repeats, "Frames to time")->capture_default_str();
-  app.add_option("--truth-spp", options.truth_spp, "Samples of the reference; 0: times only")->capture_default_str();
-  app.add_option("--degrees", options.degrees, "Degrees per frame of the orbit")->capture_default_str();
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  command_line.add("FILE", options.files, ".ptk files").required();
+  command_line.add("--mode", options.modes, "Modes to compare (default: all)").delimiter(',');
+  command_line.add("--width", options.width).show_default();
+  command_line.add("--height", options.height).show_default();
+  command_line.add("--repeats", options.repeats, "Frames to time").show_default();
+  command_line.add("--truth-spp", options.truth_spp, "Samples of the reference; 0: times only").show_default();
+  command_line.add("--degrees", options.degrees, "Degrees per frame of the orbit").show_default();
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   for (const std::string& file : options.files) compare(file, options);
   return 0;
 }

@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "compress/format/cluster/tangent_codec.h"
 #include "compress/format/cluster/uv_codec.h"
 #include "compress/format/textures/texture_encoder.h"
 #include "pbrt_import/import_scene.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/compress/q_tangent.h"
 
 /// Prints figures of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails if a documented
@@ -131,12 +131,12 @@ void print_textures(const std::string& scene) {
 } // namespace packtrace
 
 int main(int argc, char** argv) {
-  CLI::App app("Errors of texture coordinates, tangents and textures by encoding");
+  packtrace::BenchmarkOptions command_line("Errors of texture coordinates, tangents and textures by encoding");
   size_t count = 1'000'000;
   std::string scene = PACKTRACE_SOURCE_DIR "/assets/textured/textured.pbrt";
-  app.add_option("--count", count, "Coordinates and frames a row");
-  app.add_option("--textures-of", scene, "A pbrt scene");
-  CLI11_PARSE(app, argc, argv);
+  command_line.add("--count", count, "Coordinates and frames a row");
+  command_line.add("--textures-of", scene, "A pbrt scene");
+  if (const auto code = command_line.parse(argc, argv)) return *code;
   packtrace::print_uvs(count);
   packtrace::print_tangents(count);
   packtrace::print_textures(scene);

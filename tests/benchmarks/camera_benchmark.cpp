@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "compress/format/file/baked_file.h"
@@ -16,6 +15,7 @@
 #include "runtime/trace/make_tracer.h"
 #include "runtime/trace/source/packed_source.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/thread_cpu_time.h"
 
 namespace packtrace {
@@ -81,13 +81,14 @@ void compare(const std::string& name, const Options& options) {
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app("Compares the camera rays of a frame, with all that the G-buffer holds, with tracing the same rays "
-               "alone, by CPU time of one thread");
-  app.add_option("FILE", options.files, ".ptk files")->required();
-  app.add_option("--width", options.width)->capture_default_str();
-  app.add_option("--height", options.height)->capture_default_str();
-  app.add_option("--repeats", options.repeats, "Frames to time")->capture_default_str();
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line(
+      "Compares the camera rays of a frame, with all that the G-buffer holds, with tracing the same rays "
+      "alone, by CPU time of one thread");
+  command_line.add("FILE", options.files, ".ptk files").required();
+  command_line.add("--width", options.width).show_default();
+  command_line.add("--height", options.height).show_default();
+  command_line.add("--repeats", options.repeats, "Frames to time").show_default();
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   for (const std::string& file : options.files) compare(file, options);
   return 0;
 }

@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
@@ -22,6 +21,7 @@
 #include "runtime/trace/packed/scene/mesh_motion.h"
 #include "runtime/trace/source/packed_source.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/deforming_meshes.h"
 
 namespace packtrace {
@@ -274,18 +274,18 @@ nlohmann::json run_mesh(const std::string& name, const test::DeformingMesh& mesh
 
 int run_deform_benchmark(int argc, char** argv) {
   DeformOptions options;
-  CLI::App app("Plays deforming meshes from packed streams");
-  app.add_option("--mesh", options.mesh, "cloth, grass or both")->check(CLI::IsMember({"cloth", "grass", "both"}));
-  app.add_option("--triangles", options.triangles)->check(CLI::Range(500u, 20000000u));
-  app.add_option("--frames", options.frames)->check(CLI::Range(2u, 10000u));
-  app.add_option("--group", options.group)->check(CLI::Range(1u, 64u));
-  app.add_option("--threads", options.threads)->check(CLI::Range(1, 1024));
-  app.add_option("--repeats", options.repeats)->check(CLI::Range(1u, 100u));
-  app.add_option("--samples", options.samples, "Frames that are also baked alone")->check(CLI::Range(1u, 1000u));
-  app.add_option("--rays", options.rays)->check(CLI::Range(100u, 10000000u));
-  app.add_option("--max-growth", options.max_growth, "DeformConfig::max_growth")->check(CLI::Range(1.0, 4.0));
-  app.add_option("--json", options.json, "Also write the figures to this file");
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line("Plays deforming meshes from packed streams");
+  command_line.add("--mesh", options.mesh, "cloth, grass or both").one_of({"cloth", "grass", "both"});
+  command_line.add("--triangles", options.triangles).range(500u, 20000000u);
+  command_line.add("--frames", options.frames).range(2u, 10000u);
+  command_line.add("--group", options.group).range(1u, 64u);
+  command_line.add("--threads", options.threads).range(1, 1024);
+  command_line.add("--repeats", options.repeats).range(1u, 100u);
+  command_line.add("--samples", options.samples, "Frames that are also baked alone").range(1u, 1000u);
+  command_line.add("--rays", options.rays).range(100u, 10000000u);
+  command_line.add("--max-growth", options.max_growth, "DeformConfig::max_growth").range(1.0, 4.0);
+  command_line.add("--json", options.json, "Also write the figures to this file");
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   FiguresFile figures(options.json);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, options.threads);
   nlohmann::json json = nlohmann::json::array();

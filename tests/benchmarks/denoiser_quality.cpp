@@ -5,11 +5,12 @@
 #include <cstdio>
 #include <optional>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "pbrt_import/base/error.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/denoiser_cost.h"
 #include "tests/benchmarks/denoiser_scores.h"
 #include "tests/benchmarks/denoiser_sequence.h"
@@ -85,29 +86,29 @@ int run(int argc, char** argv) {
   std::filesystem::path json_file, csv_file, markdown_file;
   TraceInputOptions inputs;
   SequenceOptions options;
-  CLI::App app("Quality of denoisers against the ground truth");
-  app.add_option("scenes", scenes, "house, spaceship, killeroo, bunny, town, meadow, or .ptk and .pbrt files")
-      ->capture_default_str();
-  app.add_option("--scenes", inputs.scenes, "Folder of house, spaceship, killeroo and bunny")
-      ->envname("PACKTRACE_SCENES");
-  app.add_option("--motion", motions, "still, jittered, orbit, occluder and animated")->capture_default_str();
-  app.add_option("--framed", framed, "Scenes of which the whole is shown instead of the view of their first camera");
-  app.add_option("--frames", options.frames, "Frames of a sequence")->capture_default_str();
-  app.add_option("--width", options.size.width)->capture_default_str();
-  app.add_option("--height", options.size.height)->capture_default_str();
-  app.add_option("--truth-spp", options.truth_spp, "Samples per pixel of the ground truth")->capture_default_str();
-  app.add_option("--degrees", options.degrees_per_frame, "Degrees per frame of the orbit")->capture_default_str();
-  app.add_option("--cache", options.cache, "Folder to keep traced sequences in");
-  app.add_option("--denoiser", denoisers, "ours, history (ours without filter), reference, off (mean of the samples)")
-      ->capture_default_str();
-  app.add_option("--denoiser-set", settings, "Change settings of ours, or of reference without ours and history")
-      ->type_name("NAME=VALUE");
-  app.add_option("--cost", cost_sizes, "Also time the denoisers on a synthetic room of these sizes")
-      ->type_name("WIDTHxHEIGHT");
-  app.add_option("--json", json_file, "Also write the figures to this file");
-  app.add_option("--csv", csv_file, "Also write the figures to this file, one a line");
-  app.add_option("--markdown", markdown_file, "Also write a table to this file");
-  if (const auto exit_code = parse_arguments(app, argc, argv)) return *exit_code;
+  BenchmarkOptions command_line("Quality of denoisers against the ground truth");
+  command_line.add("scenes", scenes, "house, spaceship, killeroo, bunny, town, meadow, or .ptk and .pbrt files")
+      .show_default();
+  command_line.add("--scenes", inputs.scenes, "Folder of house, spaceship, killeroo and bunny")
+      .environment("PACKTRACE_SCENES");
+  command_line.add("--motion", motions, "still, jittered, orbit, occluder and animated").show_default();
+  command_line.add("--framed", framed, "Scenes of which the whole is shown instead of the view of their first camera");
+  command_line.add("--frames", options.frames, "Frames of a sequence").show_default();
+  command_line.add("--width", options.size.width).show_default();
+  command_line.add("--height", options.size.height).show_default();
+  command_line.add("--truth-spp", options.truth_spp, "Samples per pixel of the ground truth").show_default();
+  command_line.add("--degrees", options.degrees_per_frame, "Degrees per frame of the orbit").show_default();
+  command_line.add("--cache", options.cache, "Folder to keep traced sequences in");
+  command_line.add("--denoiser", denoisers, "ours, history (ours without filter), reference, off (mean of the samples)")
+      .show_default();
+  command_line.add("--denoiser-set", settings, "Change settings of ours, or of reference without ours and history")
+      .type_name("NAME=VALUE");
+  command_line.add("--cost", cost_sizes, "Also time the denoisers on a synthetic room of these sizes")
+      .type_name("WIDTHxHEIGHT");
+  command_line.add("--json", json_file, "Also write the figures to this file");
+  command_line.add("--csv", csv_file, "Also write the figures to this file, one a line");
+  command_line.add("--markdown", markdown_file, "Also write a table to this file");
+  if (const auto exit_code = command_line.parse(argc, argv)) return *exit_code;
   DenoiserConfig config;
   if (std::ranges::none_of(denoisers, [](const std::string& d) { return d == "ours" || d == "history"; }))
     config.kind = DenoiserKind::kReference;

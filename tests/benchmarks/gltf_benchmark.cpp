@@ -12,14 +12,15 @@
 
 #include <tiny_gltf.h>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
 #include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/import_scene.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/gltf_benchmark_cgltf.h"
 
 namespace packtrace {
@@ -77,11 +78,11 @@ int run(int argc, char** argv) {
   std::vector<std::string> files;
   std::filesystem::path json;
   int runs = 9;
-  CLI::App app("Compares the CPU time of the import of glTF files with tinygltf's and cgltf's");
-  app.add_option("FILE", files, "glTF files without compression")->required();
-  app.add_option("--runs", runs, "Runs of each; the fastest counts (default 9)")->check(CLI::Range(1, 100));
-  app.add_option("--json", json, "Write the figures to this file");
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line("Compares the CPU time of the import of glTF files with tinygltf's and cgltf's");
+  command_line.add("FILE", files, "glTF files without compression").required();
+  command_line.add("--runs", runs, "Runs of each; the fastest counts (default 9)").range(1, 100);
+  command_line.add("--json", json, "Write the figures to this file");
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   FiguresFile figures(json);
   nlohmann::json results = nlohmann::json::array();

@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <tbb/parallel_for.h>
 
@@ -24,6 +23,7 @@
 #include "runtime/trace/gpu/gpu_tracer.h"
 #include "runtime/trace/packed/scene/placed_trees.h"
 #include "runtime/trace/source/packed_source.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/gpu_frames.h"
 #include "tests/benchmarks/gpu_structures.h"
 
@@ -296,19 +296,19 @@ int run(Options& options) {
 
 int main(int argc, char** argv) {
   packtrace::Options options;
-  CLI::App app("Measures backend gpu and compares its hits with those of backend packed");
-  app.add_option("FILE", options.files, ".ptk files")->required();
-  app.add_option("--size", options.size, "of the picture")->capture_default_str();
-  app.add_option("--spp", options.spp, "occlusion rays per pixel")->capture_default_str();
-  app.add_option("--repeats", options.repeats, "of each measurement; the median counts")->capture_default_str();
-  app.add_option("--camera", options.camera, "number in the file")->capture_default_str();
-  app.add_option("--radius", options.radius, "of occlusion rays, in diagonals of the world")->capture_default_str();
-  app.add_option("--device", options.gpu.device, "part of the device's name (default: a GPU)");
-  app.add_option("--dispatch-ms", options.gpu.dispatch_ms, "time that a dispatch should take")->capture_default_str();
-  app.add_flag("--only-frames", options.only_frames, "measure frames and the denoiser only");
-  app.add_flag("--structures", options.structures, "trace with the driver's acceleration structures");
-  app.add_flag("--exact", options.exact, "make floats from doubles, whatever the device can");
-  CLI11_PARSE(app, argc, argv);
+  packtrace::BenchmarkOptions command_line("Measures backend gpu and compares its hits with those of backend packed");
+  command_line.add("FILE", options.files, ".ptk files").required();
+  command_line.add("--size", options.size, "of the picture").show_default();
+  command_line.add("--spp", options.spp, "occlusion rays per pixel").show_default();
+  command_line.add("--repeats", options.repeats, "of each measurement; the median counts").show_default();
+  command_line.add("--camera", options.camera, "number in the file").show_default();
+  command_line.add("--radius", options.radius, "of occlusion rays, in diagonals of the world").show_default();
+  command_line.add("--device", options.gpu.device, "part of the device's name (default: a GPU)");
+  command_line.add("--dispatch-ms", options.gpu.dispatch_ms, "time that a dispatch should take").show_default();
+  command_line.flag("--only-frames", options.only_frames, "measure frames and the denoiser only");
+  command_line.flag("--structures", options.structures, "trace with the driver's acceleration structures");
+  command_line.flag("--exact", options.exact, "make floats from doubles, whatever the device can");
+  if (const auto code = command_line.parse(argc, argv)) return *code;
   try {
     return packtrace::run(options);
   } catch (const packtrace::Error& error) {

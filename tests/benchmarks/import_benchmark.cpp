@@ -9,12 +9,12 @@
 #include <optional>
 #include <thread>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/import_timing.h"
 #include "tests/temporary_folder.h"
 
@@ -279,20 +279,17 @@ Json measure_all(const Options& options) {
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app{"Times the import of generated pbrt-v3 scenes; see docs/import_speed.md."};
-  app.add_option("--folder", options.folder, "keeps the inputs here and finds them again; else a temporary folder");
-  app.add_option("--repeats", options.repeats, "imports of each kind")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--json", options.json_file, "writes all figures here");
-  app.add_option("--scenes", options.scenes, "holds house/scene.pbrt, which is then imported as `ply`")
-      ->envname("PACKTRACE_SCENES");
-  app.add_option("--scale", options.scale, "of the counts, in (0, 1]; anchors are shown for 1 only")
-      ->capture_default_str();
-  app.add_flag("--growth", options.growth, "also measures 1/4, 1/2 and all of the size");
-  app.add_option("INPUT", options.inputs, "which; all if none is named")
-      ->check(CLI::IsMember(std::vector<std::string>(input_names().begin(), input_names().end())));
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line{"Times the import of generated pbrt-v3 scenes; see docs/import_speed.md."};
+  command_line.add("--folder", options.folder, "keeps the inputs here and finds them again; else a temporary folder");
+  command_line.add("--repeats", options.repeats, "imports of each kind").positive().show_default();
+  command_line.add("--json", options.json_file, "writes all figures here");
+  command_line.add("--scenes", options.scenes, "holds house/scene.pbrt, which is then imported as `ply`")
+      .environment("PACKTRACE_SCENES");
+  command_line.add("--scale", options.scale, "of the counts, in (0, 1]; anchors are shown for 1 only").show_default();
+  command_line.flag("--growth", options.growth, "also measures 1/4, 1/2 and all of the size");
+  command_line.add("INPUT", options.inputs, "which; all if none is named")
+      .one_of(std::vector<std::string>(input_names().begin(), input_names().end()));
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   if (options.inputs.empty()) options.inputs.assign(input_names().begin(), input_names().end());
   std::optional<TemporaryFolder> temporary;
   if (options.folder.empty()) options.folder = temporary.emplace().path();

@@ -12,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
@@ -21,6 +20,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/progress.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/lod_benchmark_newest.h"
 #include "tests/benchmarks/lod_benchmark_simplifiers.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
@@ -329,24 +329,25 @@ Json measure_input(const std::string& name, const Mesh& mesh, const Options& opt
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app{"Builds levels of detail and measures them, and simplifies with this project and others; see "
-               "docs/cluster_lod.md."};
-  options.inputs.add_to(app);
-  app.add_option("--samples", options.samples, "points at which surfaces are compared, each way")
-      ->capture_default_str();
-  app.add_flag("!--levels-only", options.simplifiers, "leaves the other programs' simplifiers out");
-  app.add_flag("!--times-only", options.levels, "only builds, and measures no distance");
+  BenchmarkOptions command_line{
+      "Builds levels of detail and measures them, and simplifies with this project and others; see "
+      "docs/cluster_lod.md."};
+  options.inputs.add_to(command_line);
+  command_line.add("--samples", options.samples, "points at which surfaces are compared, each way").show_default();
+  command_line.flag("!--levels-only", options.simplifiers, "leaves the other programs' simplifiers out");
+  command_line.flag("!--times-only", options.levels, "only builds, and measures no distance");
   std::vector<std::string> class_names = {"all"};
   for (const test::ClassMesh& mesh : test::class_meshes())
     class_names.push_back(mesh.of_class), class_names.push_back(mesh.name);
-  app.add_option("--class", options.classes,
-                 "measures generated meshes of a class that is hard to simplify, or one of them")
-      ->check(CLI::IsMember(class_names));
-  app.add_option("--newest-meshoptimizer", options.newest,
-                 "folder of the npm package (node_modules/meshoptimizer), to compare with it too; needs node")
-      ->check(CLI::ExistingDirectory);
-  app.add_option("--json", options.json_file, "writes all figures here");
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  command_line
+      .add("--class", options.classes, "measures generated meshes of a class that is hard to simplify, or one of them")
+      .one_of(class_names);
+  command_line
+      .add("--newest-meshoptimizer", options.newest,
+           "folder of the npm package (node_modules/meshoptimizer), to compare with it too; needs node")
+      .existing_folder();
+  command_line.add("--json", options.json_file, "writes all figures here");
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   if (options.classes.empty() || !options.inputs.names.empty()) options.inputs.choose();
   FiguresFile figures(options.json_file);
   Json json = describe_machine();

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
@@ -18,6 +17,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/lod/blas_residency.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 #include "tests/benchmarks/packing_benchmark_mesh.h"
 #include "tests/benchmarks/thread_cpu_time.h"
@@ -228,17 +228,15 @@ Json run_growth(std::span<const LodGeometry> geometries, const Options& options)
   return rows;
 }
 
-void add_options(CLI::App& app, Options& options) {
-  app.add_option("--scenes", options.scenes, "holds the bunny")->envname("PACKTRACE_SCENES");
-  app.add_option("--triangles", options.triangles, "of the generated meshes")->capture_default_str();
-  app.add_option("--repeats", options.repeats, "plans that are timed; the fastest counts")->capture_default_str();
-  app.add_option("--frames", options.frames, "of the moving camera")->capture_default_str();
-  app.add_option("--growth", options.growth, "instances up to which growth is measured; 0: not")->capture_default_str();
-  app.add_option("--triangle-bytes", options.triangle_bytes, "of a BLAS, for its MiB")->capture_default_str();
-  app.add_option("--scale", options.scale, "of the numbers of instances, for tests")
-      ->check(CLI::Range(0.001, 1.0))
-      ->capture_default_str();
-  app.add_option("--json", options.json_file, "writes all figures here");
+void add_options(BenchmarkOptions& command_line, Options& options) {
+  command_line.add("--scenes", options.scenes, "holds the bunny").environment("PACKTRACE_SCENES");
+  command_line.add("--triangles", options.triangles, "of the generated meshes").show_default();
+  command_line.add("--repeats", options.repeats, "plans that are timed; the fastest counts").show_default();
+  command_line.add("--frames", options.frames, "of the moving camera").show_default();
+  command_line.add("--growth", options.growth, "instances up to which growth is measured; 0: not").show_default();
+  command_line.add("--triangle-bytes", options.triangle_bytes, "of a BLAS, for its MiB").show_default();
+  command_line.add("--scale", options.scale, "of the numbers of instances, for tests").range(0.001, 1.0).show_default();
+  command_line.add("--json", options.json_file, "writes all figures here");
 }
 
 /// Meshes whose LOD levels are built: the bunny if available, the generated mesh, and a torus with seams.
@@ -256,11 +254,11 @@ std::vector<std::pair<std::string, LodGeometry>> build_meshes(const Options& opt
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app{
+  BenchmarkOptions command_line{
       "Shares BLASes of levels of detail between instances by several schemes, and says what is built, what is "
       "traced and how long the choice takes; see docs/lod_runtime.md."};
-  add_options(app, options);
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  add_options(command_line, options);
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   FiguresFile figures(options.json_file);
   Json json = describe_machine();
   const auto meshes = build_meshes(options);

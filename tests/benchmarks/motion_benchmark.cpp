@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <memory>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
@@ -14,6 +13,7 @@
 #include "runtime/trace/make_tracer.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 #include "tests/benchmarks/trace_benchmark_inputs.h"
 #include "tests/benchmarks/trace_benchmark_rays.h"
@@ -150,19 +150,16 @@ nlohmann::ordered_json measure(const TraceInput& input, const MotionOptions& opt
 int run(int argc, char** argv) {
   MotionOptions options;
   std::string json_file;
-  CLI::App app{"Times RayTracer::place_instances(), and rays among moved instances against those of a new tracer."};
-  app.add_option("--frames", options.frames, "moves, of which the median counts")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 10000));
-  app.add_option("--width", options.size.width, "pixels")->capture_default_str();
-  app.add_option("--height", options.size.height, "pixels")->capture_default_str();
-  app.add_option("--repeats", options.repeats, "of rays, of which the median counts")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  app.add_option("--threads", options.threads)->capture_default_str()->check(CLI::Range(1, 1024));
-  app.add_option("--json", json_file, "writes all figures here");
-  app.add_option("INPUT", options.scene, "as for trace_benchmark")->capture_default_str();
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line{
+      "Times RayTracer::place_instances(), and rays among moved instances against those of a new tracer."};
+  command_line.add("--frames", options.frames, "moves, of which the median counts").show_default().range(1, 10000);
+  command_line.add("--width", options.size.width, "pixels").show_default();
+  command_line.add("--height", options.size.height, "pixels").show_default();
+  command_line.add("--repeats", options.repeats, "of rays, of which the median counts").show_default().range(1, 1000);
+  command_line.add("--threads", options.threads).show_default().range(1, 1024);
+  command_line.add("--json", json_file, "writes all figures here");
+  command_line.add("INPUT", options.scene, "as for trace_benchmark").show_default();
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   FiguresFile file(json_file);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, options.threads);
   nlohmann::json json = describe_machine();

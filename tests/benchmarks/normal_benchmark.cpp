@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/blocked_range.h>
@@ -21,6 +20,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/stopwatch.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 
 namespace packtrace {
@@ -191,10 +191,10 @@ bool measure_all(size_t count, Json& json) {
 int run(int argc, char** argv) {
   size_t count = 10'000'000;
   std::filesystem::path json_file;
-  CLI::App app{"Measures the error and the speed of each encoding of normals; see docs/accuracy.md."};
-  app.add_option("--directions", count, "of each set")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--json", json_file, "writes all figures here");
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line{"Measures the error and the speed of each encoding of normals; see docs/accuracy.md."};
+  command_line.add("--directions", count, "of each set").positive().show_default();
+  command_line.add("--json", json_file, "writes all figures here");
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   FiguresFile figures(json_file);
   Json json = describe_machine();
   json["directions"] = count;

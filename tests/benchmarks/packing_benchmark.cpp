@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
 #include "pbrt_import/base/error.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/packing_benchmark_codecs.h"
 #include "tests/benchmarks/packing_benchmark_cracks.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
@@ -173,14 +173,15 @@ Json measure_input(const PackingInput& input, const Options& options) {
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app{"Packs meshes with this project and with others, for the same error; see docs/packing_benchmark.md."};
-  options.inputs.add_to(app);
-  app.add_option("--seconds", options.seconds, "of CPU time for the repeats of each step; the least counts")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  app.add_option("--codec", options.codec, "only codecs with this in their names");
-  app.add_option("--json", options.json_file, "writes all figures here");
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line{
+      "Packs meshes with this project and with others, for the same error; see docs/packing_benchmark.md."};
+  options.inputs.add_to(command_line);
+  command_line.add("--seconds", options.seconds, "of CPU time for the repeats of each step; the least counts")
+      .not_negative()
+      .show_default();
+  command_line.add("--codec", options.codec, "only codecs with this in their names");
+  command_line.add("--json", options.json_file, "writes all figures here");
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   options.inputs.choose();
   FiguresFile figures(options.json_file);
 

@@ -9,6 +9,7 @@
 
 #include "assets/generator/displaced_mesh.h"
 #include "pbrt_import/import_scene.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -117,11 +118,10 @@ PackingInput find_packing_input(const std::string& name, const std::filesystem::
   return generated_packing_input(generated_triangles, folder.path());
 }
 
-void PackingInputs::add_to(CLI::App& app) {
-  app.add_option("--scenes", scenes, "holds bunny, spaceship and house")->envname("PACKTRACE_SCENES");
-  app.add_option("--generated-triangles", generated_triangles, "of the generated mesh")->capture_default_str();
-  app.add_option("INPUT", names, "which; all if none is named")
-      ->check(CLI::IsMember({"bunny", "spaceship", "house", "generated"}));
+void PackingInputs::add_to(BenchmarkOptions& command_line) {
+  command_line.add("--scenes", scenes, "holds bunny, spaceship and house").environment("PACKTRACE_SCENES");
+  command_line.add("--generated-triangles", generated_triangles, "of the generated mesh").show_default();
+  command_line.add("INPUT", names, "which; all if none is named").one_of({"bunny", "spaceship", "house", "generated"});
 }
 
 void PackingInputs::choose() {

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
+
+class BenchmarkOptions;
 
 /// The data that a codec must keep.
 enum class PackedStreams {
@@ -43,7 +43,7 @@ struct PackingInputs {
   uint64_t generated_triangles = 500'000;
   std::vector<std::string> names;
 
-  void add_to(CLI::App& app);
+  void add_to(BenchmarkOptions& command_line);
   /// Call after parsing. Selects all available inputs if none was named.
   void choose();
   PackingInput find(const std::string& name) const { return find_packing_input(name, scenes, generated_triangles); }

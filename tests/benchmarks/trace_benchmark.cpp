@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
@@ -15,6 +14,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/trace/make_tracer.h"
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 #include "tests/benchmarks/trace_benchmark_counts.h"
 #include "tests/benchmarks/trace_benchmark_inputs.h"
@@ -197,44 +197,46 @@ Json measure_input(const std::string& name, const Options& options) {
   return json;
 }
 
-void add_options(CLI::App& app, Options& options) {
-  app.add_option("--scenes", options.inputs.scenes, "holds house, spaceship, bunny and killeroo")
-      ->envname("PACKTRACE_SCENES");
-  app.add_option("--mesh-triangles", options.inputs.mesh_triangles, "of the input mesh")->capture_default_str();
-  app.add_option("--forest-instances", options.inputs.forest_instances, "of the input forest")->capture_default_str();
-  app.add_option("--camera", options.camera, "which of the scene's, or auto; auto instead of one that sees nothing")
-      ->capture_default_str();
-  app.add_option("--width", options.size.width, "pixels")->capture_default_str();
-  app.add_option("--height", options.size.height, "pixels")->capture_default_str();
-  app.add_option("--threads", options.threads, "how many, one table each")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
-  app.add_option("--repeats", options.repeats, "of which the median counts")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  app.add_flag("--cpu-clock", options.cpu_clock,
-               "CPU time of all threads divided by their number, not wall time: for machines that do other things");
-  app.add_option("--max-mismatches", options.max_mismatches,
-                 "fail if watertight systems differ from Embree robust in more than this share of a phase's rays");
-  app.add_option("--scales", options.scales,
-                 "instead: bakes the inputs (no .ptk files) at these scales and counts hits that are not those at 1")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::Range(1e-30, 1e30));
-  app.add_flag("--growth", options.growth,
-               "instead: times the input mesh against one of a sixteenth of its triangles, one thread");
-  app.add_option("--json", options.json_file, "writes all figures here");
-  app.add_option("INPUT", options.names,
-                 "house, spaceship, bunny, killeroo, town; mesh and forest, which are generated; .ptk and .pbrt files "
-                 "(default: the first five, or town where there is no folder of scenes)");
+void add_options(BenchmarkOptions& command_line, Options& options) {
+  command_line.add("--scenes", options.inputs.scenes, "holds house, spaceship, bunny and killeroo")
+      .environment("PACKTRACE_SCENES");
+  command_line.add("--mesh-triangles", options.inputs.mesh_triangles, "of the input mesh").show_default();
+  command_line.add("--forest-instances", options.inputs.forest_instances, "of the input forest").show_default();
+  command_line.add("--camera", options.camera, "which of the scene's, or auto; auto instead of one that sees nothing")
+      .show_default();
+  command_line.add("--width", options.size.width, "pixels").show_default();
+  command_line.add("--height", options.size.height, "pixels").show_default();
+  command_line.add("--threads", options.threads, "how many, one table each")
+      .delimiter(',')
+      .one_argument()
+      .show_default();
+  command_line.add("--repeats", options.repeats, "of which the median counts").show_default().range(1, 1000);
+  command_line.flag(
+      "--cpu-clock", options.cpu_clock,
+      "CPU time of all threads divided by their number, not wall time: for machines that do other things");
+  command_line.add("--max-mismatches", options.max_mismatches,
+                   "fail if watertight systems differ from Embree robust in more than this share of a phase's rays");
+  command_line
+      .add("--scales", options.scales,
+           "instead: bakes the inputs (no .ptk files) at these scales and counts hits that are not those at 1")
+      .delimiter(',')
+      .one_argument()
+      .range(1e-30, 1e30);
+  command_line.flag("--growth", options.growth,
+                    "instead: times the input mesh against one of a sixteenth of its triangles, one thread");
+  command_line.add("--json", options.json_file, "writes all figures here");
+  command_line.add(
+      "INPUT", options.names,
+      "house, spaceship, bunny, killeroo, town; mesh and forest, which are generated; .ptk and .pbrt files "
+      "(default: the first five, or town where there is no folder of scenes)");
 }
 
 int run(int argc, char** argv) {
   Options options;
-  CLI::App app{"Traces the same recorded rays with every tracer and in all ways of Embree; see docs/tracing.md."};
-  add_options(app, options);
-  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
+  BenchmarkOptions command_line{
+      "Traces the same recorded rays with every tracer and in all ways of Embree; see docs/tracing.md."};
+  add_options(command_line, options);
+  if (const std::optional<int> code = command_line.parse(argc, argv)) return *code;
   if (options.names.empty()) {
     options.names = {"town"};
     if (!options.inputs.scenes.empty())

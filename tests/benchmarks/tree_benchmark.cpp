@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
@@ -18,6 +17,7 @@
 #include "compress/format/file/baked_file.h"
 #include "compress/format/trees/packed_trees.h"
 #include "pbrt_import/base/error.h"
+#include "tests/benchmarks/benchmark_options.h"
 
 namespace packtrace {
 namespace {
@@ -122,18 +122,18 @@ nlohmann::ordered_json measure(const std::string& path, const TreeCosts& costs, 
 
 int main(int argc, char** argv) {
   using namespace packtrace;
-  CLI::App app("Builds the trees of baked files and measures them.");
+  BenchmarkOptions command_line("Builds the trees of baked files and measures them.");
   std::vector<std::string> files;
   TreeCosts costs;
   int repeats = 3;
-  app.add_option("files", files, ".ptk files")->required();
-  app.add_option("--repeats", repeats, "builds to time; the fastest counts; 0: none");
-  app.add_option("--node", costs.node, "cost of a node");
-  app.add_option("--leaf", costs.leaf, "cost of a leaf");
-  app.add_option("--batch", costs.batch, "cost of eight triangles");
-  app.add_option("--extra-node", costs.extra_node, "cost of one more node for all else");
-  app.add_option("--max-leaf", costs.max_leaf_triangles, "triangles of a leaf at most")->check(CLI::Range(1u, 16u));
-  CLI11_PARSE(app, argc, argv);
+  command_line.add("files", files, ".ptk files").required();
+  command_line.add("--repeats", repeats, "builds to time; the fastest counts; 0: none");
+  command_line.add("--node", costs.node, "cost of a node");
+  command_line.add("--leaf", costs.leaf, "cost of a leaf");
+  command_line.add("--batch", costs.batch, "cost of eight triangles");
+  command_line.add("--extra-node", costs.extra_node, "cost of one more node for all else");
+  command_line.add("--max-leaf", costs.max_leaf_triangles, "triangles of a leaf at most").range(1u, 16u);
+  if (const auto code = command_line.parse(argc, argv)) return *code;
   try {
     nlohmann::ordered_json out = nlohmann::ordered_json::array();
     for (const std::string& file : files) out.push_back(measure(file, costs, repeats));
