@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
 
 #include <tbb/blocked_range.h>
@@ -95,8 +96,12 @@ private:
     };
     for_each_point([&](DVec3 p) { lo = glm::min(lo, p), hi = glm::max(hi, p); });
     LodSphere sphere{0.5 * (lo + hi), 0.0};
-    for_each_point([&](DVec3 p) { sphere.radius = std::max(sphere.radius, distance(p, sphere.center)); });
-    sphere.radius *= kInflation;
+    double radius2 = 0.0;
+    for_each_point([&](DVec3 p) {
+      const DVec3 d = p - sphere.center;
+      radius2 = std::max(radius2, glm::dot(d, d));
+    });
+    sphere.radius = kInflation * std::sqrt(radius2);
     return sphere;
   }
 
@@ -158,7 +163,9 @@ private:
           for (int corner = 0; corner < 3; ++corner) {
             const Triangle& t = lod_.triangles[c.range.first_triangle + i];
             std::atomic_ref<uint32_t> owner(owner_[lod_.vertices[t[corner]].position]);
-            uint32_t expected = kNone;
+            uint32_t expected = owner.load(std::memory_order_relaxed);
+            if (expected == group || expected == kShared) continue; // mostly; exchanges take several times as long
+            expected = kNone;
             if (!owner.compare_exchange_strong(expected, static_cast<uint32_t>(group), std::memory_order_relaxed) &&
                 expected != group)
               owner.store(kShared, std::memory_order_relaxed);

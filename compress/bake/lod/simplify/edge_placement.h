@@ -7,7 +7,8 @@ namespace packtrace {
 /// A point of a surface under edge collapse. Plain data, as it is compiled for several instruction sets.
 struct alignas(32) CollapsePoint {
   double quadric[10]; ///< xx, xy, xz, yy, yz, zz, bx, by, bz, c
-  double unused[2];
+  double area;        ///< sum of the parallelogram areas of the triangles around it, before any collapse
+  double unused;
   double at[3];
   double held; ///< sum of the flags that apply: kOnBorder, kLocked
 };

@@ -1,13 +1,11 @@
 // Places edge collapses, four edges in SIMD lanes. Compiled per instruction set with the same operations in the same
-// order, so results are bit-identical. No other header's functions may be compiled for AVX2.
+// order, so results are bit-identical. No functions of headers other than lanes.h may be compiled for AVX2.
 
 #include "compress/bake/lod/simplify/edge_placement.h"
+#include "compress/bake/lod/simplify/lanes.h"
 
 namespace packtrace {
 namespace {
-
-using Lanes = double __attribute__((vector_size(32)));
-using Row = double __attribute__((vector_size(32), may_alias, aligned(8))); // lanes as stored in memory
 
 struct Quadric4 {
   Lanes xx, xy, xz, yy, yz, zz, bx, by, bz, c;
@@ -92,13 +90,6 @@ template <typename Mask>
   cost = better ? at_p : cost;
   along = better ? t : along;
   point.x = better ? p.x : point.x, point.y = better ? p.y : point.y, point.z = better ? p.z : point.z;
-}
-
-[[gnu::always_inline]] inline void transpose(Lanes& v0, Lanes& v1, Lanes& v2, Lanes& v3) {
-  const Lanes a = __builtin_shufflevector(v0, v1, 0, 4, 2, 6), b = __builtin_shufflevector(v0, v1, 1, 5, 3, 7);
-  const Lanes c = __builtin_shufflevector(v2, v3, 0, 4, 2, 6), d = __builtin_shufflevector(v2, v3, 1, 5, 3, 7);
-  v0 = __builtin_shufflevector(a, c, 0, 1, 4, 5), v1 = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-  v2 = __builtin_shufflevector(a, c, 2, 3, 6, 7), v3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
 /// Row i of a point: doubles 4 i to 4 i + 3. Rows 0 to 2 hold the quadric, row 3 the position and `held`.

@@ -1,12 +1,12 @@
 #include "compress/bake/lod/simplify/surface_edges.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "compress/bake/lod/simplify/quadric.h"
+#include "compress/bake/lod/simplify/triangle_planes.h"
+#include "pbrt_import/base/cpu.h"
 
 namespace packtrace {
 namespace {
@@ -27,15 +27,12 @@ constexpr double kTipWeight = 1.0;
 // rim, 0.9 in right angles, 1 at infinitely thin tips.
 constexpr double kTip = 0.75;
 
-/// The arcsine for 0 <= x <= 0.71; the error is at most 1 %.
-double small_arcsine(double x) { return x * (1.0 + x * x * (1.0 / 6.0 + x * x * (3.0 / 40.0))); }
-
-/// The triangles around a point.
-struct Fan {
-  DVec3 directions{0.0}; ///< integral of the unit vectors in the triangles over their angles
-  double angle = 0.0;    ///< sum, in radians
-  double area = 0.0;     ///< sum of parallelogram areas
-};
+PlaneKernel pick_plane_kernel() {
+#if defined(__x86_64__)
+  if (cpu_has_avx2()) return avx2::add_triangle_planes;
+#endif
+  return add_triangle_planes;
+}
 
 /// An edge under construction.
 struct EdgeUse {
@@ -62,8 +59,8 @@ public:
     out_.side_edge.resize(3 * count);
     out_.ends.reserve(2 * count);
     uses_.reserve(2 * count);
+    add_planes();
     for (uint32_t t = 0; t < count; ++t) {
-      add_plane(t);
       const Triangle& p = m_.triangles[t].points;
       out_.side_edge[3 * t] = find_edge(p.x, p.y, t);
       out_.side_edge[3 * t + 1] = find_edge(p.y, p.z, t);
@@ -82,31 +79,14 @@ private:
     for (size_t i = 0; i < std::size(CollapsePoint{}.quadric); ++i) sum[i] += from[i];
   }
 
-  void add_plane(uint32_t triangle) {
-    const Triangle& t = m_.triangles[triangle].points;
-    const DVec3 a = m_.points[t.x], n = glm::cross(m_.points[t.y] - a, m_.points[t.z] - a);
-    out_.area_normals[triangle] = n;
-    const double area = glm::length(n);
-    if (!(area > 0.0)) return add_line(t);
-    Quadric q;
-    q.add_plane(n / area, a, area);
-    for (const uint32_t p : {t.x, t.y, t.z}) add(q, p), fans_[p].area += area;
-    add_to_fans(t);
-  }
-
-  void add_to_fans(const Triangle& points) {
-    std::array<DVec3, 3> sides; // unit vectors
-    for (int i = 0; i < 3; ++i)
-      sides[static_cast<size_t>(i)] = glm::normalize(m_.points[points[(i + 1) % 3]] - m_.points[points[i]]);
-    for (int i = 0; i < 3; ++i) {
-      const DVec3 &from = sides[static_cast<size_t>(i)], &to = sides[static_cast<size_t>((i + 2) % 3)];
-      const double cosine = -glm::dot(from, to);
-      const double half_sine = std::sqrt(std::max(0.0, 0.5 - 0.5 * cosine));
-      const double half_cosine = std::sqrt(std::max(0.0, 0.5 + 0.5 * cosine));
-      Fan& fan = fans_[points[i]];
-      fan.angle += cosine > 0.0 ? 2.0 * small_arcsine(half_sine) : std::numbers::pi - 2.0 * small_arcsine(half_cosine);
-      if (half_cosine > 0.0) fan.directions += (half_sine / half_cosine) * (from - to);
-    }
+  void add_planes() {
+    static const PlaneKernel kernel = pick_plane_kernel();
+    static_assert(sizeof(DVec3) == 3 * sizeof(double) && sizeof(Triangle) == 3 * sizeof(uint32_t));
+    const uint64_t count = m_.triangles.size();
+    const PlaneTask task{&m_.points[0].x,     reinterpret_cast<const char*>(&m_.triangles[0].points),
+                         sizeof(LodTriangle), &out_.area_normals[0].x,
+                         out_.points.data(),  fans_.data()};
+    for (uint64_t t = 0; (t = kernel(task, t, count)) < count; ++t) add_line(m_.triangles[t].points);
   }
 
   /// Adds quadrics for a triangle with collinear corners, which has no plane: keeps the corners near the line and its
@@ -209,8 +189,8 @@ private:
   void finish_point(size_t i) {
     CollapsePoint& out = out_.points[i];
     Quadric stay;
-    stay.add_point(m_.points[i], kStayWeight * fans_[i].area);
-    add_tip(fans_[i], m_.points[i], stay);
+    stay.add_point(m_.points[i], kStayWeight * out.area);
+    add_tip(i, stay);
     add(stay, static_cast<uint32_t>(i));
     for (int axis = 0; axis < 3; ++axis) out.at[axis] = m_.points[i][axis];
     if (m_.locked[i] != 0) out.held += kLocked;
@@ -218,16 +198,17 @@ private:
 
   /// Adds a plane across the tip at a point where the surface extends to one side only. Fans of flat parts, straight
   /// rims and straight creases have no direction along them, so such points may still move there.
-  static void add_tip(const Fan& fan, DVec3 point, Quadric& q) {
-    const double length = glm::length(fan.directions), share = length / fan.angle;
+  void add_tip(size_t i, Quadric& q) const {
+    const DVec3 directions(fans_[i].directions[0], fans_[i].directions[1], fans_[i].directions[2]);
+    const double length = glm::length(directions), share = length / fans_[i].angle;
     if (share > kTip)
-      q.add_plane(fan.directions / length, point, kTipWeight * fan.area * (share - kTip) / (1.0 - kTip));
+      q.add_plane(directions / length, m_.points[i], kTipWeight * out_.points[i].area * (share - kTip) / (1.0 - kTip));
   }
 
   const SimplifyMesh& m_;
   const SimplifyConfig& config_;
   bool many_seams_;             ///< whether there are wedges or several triangle kinds
-  std::vector<Fan> fans_;       ///< per point
+  std::vector<PointFan> fans_;  ///< per point
   std::vector<uint32_t> first_; ///< per point: the last edge with it as lower-numbered point
   std::vector<EdgeUse> uses_;   ///< per edge
   SurfaceEdges out_;
