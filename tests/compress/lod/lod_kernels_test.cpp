@@ -15,59 +15,13 @@
 #include "compress/bake/lod/bound/triangle_set.h"
 #include "compress/bake/lod/simplify/edge_heap.h"
 #include "compress/bake/lod/simplify/edge_placement.h"
+#include "compress/bake/lod/simplify/triangle_planes.h"
 #include "pbrt_import/base/cpu.h"
+#include "tests/compress/lod/test_surfaces.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {
 namespace {
-
-DVec3 random_point(Random& random) {
-  return 100.0 * DVec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
-}
-
-/// A surface for overlays.
-struct Surface {
-  std::vector<DVec3> points;
-  std::vector<LodTriangle> triangles;
-  OverlaySurface view() const { return {points, triangles}; }
-  std::vector<uint32_t> all() const {
-    std::vector<uint32_t> numbers(triangles.size());
-    for (uint32_t i = 0; i < numbers.size(); ++i) numbers[i] = i;
-    return numbers;
-  }
-  std::array<DVec3, 3> corners(size_t i) const {
-    const Triangle& t = triangles[i].points;
-    return {points[t.x], points[t.y], points[t.z]};
-  }
-};
-
-/// A square [0, 100]^2 of cells x cells, with points displaced vertically by up to `height`.
-Surface bumpy_square(uint32_t cells, float height, uint32_t seed) {
-  Random random(seed);
-  Surface s;
-  for (uint32_t y = 0; y <= cells; ++y)
-    for (uint32_t x = 0; x <= cells; ++x)
-      s.points.emplace_back(100.0 * x / cells, 100.0 * y / cells, random.uniform(-height, height));
-  for (uint32_t y = 0; y < cells; ++y)
-    for (uint32_t x = 0; x < cells; ++x) {
-      const uint32_t a = y * (cells + 1) + x, b = a + cells + 1;
-      s.triangles.push_back({Triangle(a, a + 1, b + 1), Triangle(Wedge::kNone), 0, 0.0});
-      s.triangles.push_back({Triangle(a, b + 1, b), Triangle(Wedge::kNone), 0, 0.0});
-    }
-  return s;
-}
-
-Surface random_triangles(uint32_t count, uint32_t seed) {
-  Random random(seed);
-  Surface s;
-  for (uint32_t i = 0; i < count; ++i) {
-    const DVec3 a = random_point(random), b = i % 9 == 0 ? a : random_point(random);
-    const DVec3 c = i % 7 == 0 ? a + 0.5 * (b - a) : random_point(random);
-    for (const DVec3& p : {a, b, c}) s.points.push_back(p);
-    s.triangles.push_back({Triangle(3 * i, 3 * i + 1, 3 * i + 2), Triangle(Wedge::kNone), 0, 0.0});
-  }
-  return s;
-}
 
 /// Distances of points from the triangles of a set.
 class Rows {
@@ -156,81 +110,6 @@ TEST(TriangleRefiner, BoundsTheDistanceOfEveryPoint) {
       EXPECT_LE(sampled, bound + 1e-9);
       EXPECT_LE(bound, std::max(enough, 1.15 * sampled)); // refinement stops within 1.1 of the lower bound
     }
-}
-
-TEST(Overlay, PiecesBoundTheDistanceOfTheTriangle) {
-  const Surface coarse = bumpy_square(7, 5.0f, 3), fine = bumpy_square(11, 5.0f, 4);
-  const std::vector<uint32_t> all = coarse.all();
-  Overlay overlay(coarse.view());
-  for (size_t t = 0; t < fine.triangles.size(); ++t) {
-    const std::array<DVec3, 3> p = fine.corners(t);
-    std::vector<OverlayPiece> pieces;
-    ASSERT_TRUE(overlay.overlay(p, DVec3(0, 0, 1), all, pieces)) << t;
-    double bound = 0.0, nearest_bound = 0.0;
-    for (const OverlayPiece& piece : pieces) {
-      bound = std::max(bound, piece.distance);
-      const double nearest = overlay.nearest_distance(piece);
-      EXPECT_LE(nearest, piece.distance);
-      nearest_bound = std::max(nearest_bound, nearest);
-    }
-    for (int i = 0; i <= 10; ++i)
-      for (int k = 0; k <= 10 - i; ++k) {
-        const DVec3 q = p[0] + 0.1 * i * (p[1] - p[0]) + 0.1 * k * (p[2] - p[0]);
-        double distance = 1e300;
-        for (const uint32_t s : all) distance = std::min(distance, coarse.view().distance(q, s));
-        EXPECT_LE(distance, nearest_bound + 1e-9);
-        EXPECT_LE(distance, bound + 1e-9);
-      }
-  }
-}
-
-TEST(Overlay, ACoincidingTriangleIsOnePiece) {
-  const Surface s = bumpy_square(5, 5.0f, 5);
-  const std::vector<uint32_t> all = s.all();
-  Overlay overlay(s.view());
-  for (const uint32_t t : all) {
-    std::vector<OverlayPiece> pieces;
-    ASSERT_TRUE(overlay.overlay(s.corners(t), s.view().area_normal(t), all, pieces));
-    ASSERT_EQ(pieces.size(), 1u);
-    EXPECT_EQ(pieces[0].triangle, t);
-    EXPECT_EQ(pieces[0].inner_sides, 0u);
-    EXPECT_LT(pieces[0].distance, 1e-9);
-  }
-}
-
-TEST(Overlay, HolesAndSecondLayersAreNoCover) {
-  const Surface s = bumpy_square(4, 5.0f, 6), other = bumpy_square(3, 0.0f, 7);
-  Overlay overlay(s.view());
-  const std::array<DVec3, 3> p = other.corners(8);
-  std::vector<OverlayPiece> pieces;
-  ASSERT_TRUE(overlay.overlay(p, DVec3(0, 0, 1), s.all(), pieces));
-  const std::vector<OverlayPiece> whole = pieces;
-  ASSERT_GE(whole.size(), 2u);
-  for (const OverlayPiece& left_out : whole) {
-    std::vector<uint32_t> with_hole = s.all();
-    std::erase(with_hole, left_out.triangle);
-    EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, 1), with_hole, pieces));
-  }
-  std::vector<uint32_t> twice = {whole[0].triangle, whole[0].triangle};
-  for (const OverlayPiece& piece : whole) twice.push_back(piece.triangle);
-  EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, 1), twice, pieces));
-  EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, -1), s.all(), pieces)); // seen from behind
-  EXPECT_FALSE(overlay.overlay(p, DVec3(1, 0, 0), s.all(), pieces));  // edge-on
-  EXPECT_EQ(pieces.size(), whole.size());                             // nothing was appended
-}
-
-TEST(Overlay, HalfCoveredTwiceIsNotCovered) {
-  const Surface s{{{0, 0, 0}, {2, 0, 0}, {1, 1, 0}, {0, 0, 1}, {2, 0, 1}, {1, 1, 1}, {0, 2, 0}}, {}};
-  Surface layers = s, whole = s;
-  for (const Triangle& t : {Triangle(0, 1, 2), Triangle(3, 4, 5)})
-    layers.triangles.push_back({t, Triangle(Wedge::kNone), 0, 0.0});
-  for (const Triangle& t : {Triangle(0, 1, 2), Triangle(0, 2, 6)})
-    whole.triangles.push_back({t, Triangle(Wedge::kNone), 0, 0.0});
-  const std::array<DVec3, 3> p{DVec3(0, 0, 0), DVec3(2, 0, 0), DVec3(0, 2, 0)};
-  std::vector<OverlayPiece> pieces;
-  // although the areas add up to the triangle's
-  EXPECT_FALSE(Overlay(layers.view()).overlay(p, DVec3(0, 0, 1), layers.all(), pieces));
-  EXPECT_TRUE(Overlay(whole.view()).overlay(p, DVec3(0, 0, 1), whole.all(), pieces));
 }
 
 TEST(EdgeHeap, GivesEdgesByCostThenNumber) {
@@ -334,7 +213,53 @@ TEST(EdgePlacement, IsNoWorseThanTheEnds) {
   }
 }
 
+/// What add_triangle_planes() and its variants compute for a surface.
+struct PlaneSums {
+  explicit PlaneSums(const Surface& s)
+      : surface(s), normals(s.triangles.size()), sums(s.points.size()), fans(s.points.size()) {}
+  uint64_t run(PlaneKernel kernel, uint64_t first) {
+    return kernel({&surface.points[0].x, reinterpret_cast<const char*>(&surface.triangles[0].points),
+                   sizeof(LodTriangle), &normals[0].x, sums.data(), fans.data()},
+                  first, normals.size());
+  }
+  const Surface& surface;
+  std::vector<DVec3> normals;
+  std::vector<CollapsePoint> sums;
+  std::vector<PointFan> fans;
+};
+
+TEST(TrianglePlanes, AnglesAroundAPointAddUpAndStopAtTrianglesWithoutArea) {
+  Surface s = bumpy_square(6, 0.0f, 13);
+  s.triangles.insert(s.triangles.begin() + 30, {Triangle(0, 1, 2), Triangle(Wedge::kNone), 0, 0.0}); // on one line
+  PlaneSums planes(s);
+  EXPECT_EQ(planes.run(add_triangle_planes, 0), 30u);
+  EXPECT_EQ(planes.run(add_triangle_planes, 31), s.triangles.size());
+  const size_t inner = 3 * 7 + 3, rim = 3;
+  EXPECT_NEAR(planes.fans[inner].angle, 2.0 * M_PI, 0.1); // the arcsine is 1 % off
+  EXPECT_NEAR(planes.fans[rim].angle, M_PI, 0.05);
+  EXPECT_NEAR(glm::length(DVec3(planes.fans[inner].directions[0], planes.fans[inner].directions[1], 0)), 0.0, 1e-9);
+  EXPECT_NEAR(planes.fans[rim].directions[1], 2.0, 1e-9); // integral of the sine from 0 to pi
+  const double cell = (100.0 / 6) * (100.0 / 6);
+  EXPECT_NEAR(planes.sums[inner].area, 6 * cell, 1e-9);       // six triangles of half a cell; twice their area
+  EXPECT_NEAR(planes.sums[inner].quadric[5], 6 * cell, 1e-9); // zz: all normals are (0, 0, 1)
+  EXPECT_NEAR(planes.sums[inner].quadric[0], 0.0, 1e-9);
+}
+
 #if defined(__x86_64__)
+
+TEST(LodKernels, AddTheSamePlanesOnEveryProcessor) {
+  if (!cpu_has_avx2()) GTEST_SKIP() << "no AVX2";
+  const Surface s = random_triangles(63, 14);
+  PlaneSums planes(s), same(s);
+  for (uint64_t at = 0; at < s.triangles.size(); ++at) {
+    const uint64_t next = planes.run(add_triangle_planes, at);
+    EXPECT_EQ(same.run(avx2::add_triangle_planes, at), next);
+    at = next;
+  }
+  EXPECT_EQ(std::memcmp(planes.normals.data(), same.normals.data(), sizeof(DVec3) * s.triangles.size()), 0);
+  EXPECT_EQ(std::memcmp(planes.sums.data(), same.sums.data(), sizeof(CollapsePoint) * s.points.size()), 0);
+  EXPECT_EQ(std::memcmp(planes.fans.data(), same.fans.data(), sizeof(PointFan) * s.points.size()), 0);
+}
 
 TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
   if (!cpu_has_avx2()) GTEST_SKIP() << "no AVX2";
@@ -375,14 +300,16 @@ TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
         slope->l1 = 0.01 * slopes.uniform(-1, 1), slope->l2 = 0.01 * slopes.uniform(-1, 1);
         slope->l0 = -(slope->l1 + slope->l2), slope->height = slopes.uniform(-1, 1);
       }
-      double covered = 0.0;
+      OverlayCover cover{};
       const std::vector<uint32_t> all = s.all();
       pieces.resize(all.size());
-      pieces.resize(kernel(task, all.data(), static_cast<uint32_t>(all.size()), pieces.data(), &covered));
-      return covered;
+      pieces.resize(kernel(task, all.data(), static_cast<uint32_t>(all.size()), pieces.data(), &cover));
+      return cover;
     };
     std::vector<OverlayPiece> pieces, same_pieces;
-    EXPECT_EQ(lay(overlay_kernel, pieces), lay(avx2::overlay_kernel, same_pieces));
+    const OverlayCover cover = lay(overlay_kernel, pieces), same_cover = lay(avx2::overlay_kernel, same_pieces);
+    EXPECT_EQ(cover.count, same_cover.count);
+    EXPECT_EQ(cover.largest, same_cover.largest);
     ASSERT_EQ(pieces.size(), same_pieces.size());
     for (size_t i = 0; i < pieces.size(); ++i) {
       EXPECT_EQ(pieces[i].triangle, same_pieces[i].triangle);

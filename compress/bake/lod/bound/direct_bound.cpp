@@ -260,7 +260,8 @@ private:
     overlay_.clear();
     work_ += simplified_.candidates().size();
     const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-    if (!simplified_.overlay(triangle, normal, overlay_)) return;
+    if (!simplified_.overlay(triangle, normal, overlay_) && !simplified_.overlay().overlay_over_borders(overlay_))
+      return;
     double largest = 0.0;
     tried_.clear();
     for (OverlayPiece& piece : overlay_) {

@@ -6,6 +6,7 @@ namespace packtrace {
 
 /// The overlap of the overlaid triangle with one surface triangle.
 struct OverlayPiece {
+  static constexpr uint32_t kBeyondSide = 8; ///< in inner_sides: not an overlap, but what lies beyond an open side
   uint32_t triangle;
   uint32_t inner_sides; ///< bit i: the side starting at corner i crosses the overlaid triangle's interior
   double distance;      ///< maximum distance of points of either triangle there from the other
@@ -29,17 +30,22 @@ struct OverlayTask {
   OverlayPoint from_x, from_y, from_z; ///< derivatives of the coordinates; the origin's are 1, 0, 0, 0
 };
 
+/// How the pieces of a task cover the triangle.
+struct OverlayCover {
+  double count;     ///< on average
+  uint32_t largest; ///< index of the piece with the largest area
+};
+
 /// Overlays the triangle on the candidates until `enough` is reached; ignores back-facing candidates. Writes at most
 /// one piece per candidate and returns the number of pieces.
-/// @param covered set to how often the pieces cover the triangle on average
 using OverlayKernel = uint32_t (*)(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
-                                   OverlayPiece* pieces, double* covered);
+                                   OverlayPiece* pieces, OverlayCover* cover);
 
 uint32_t overlay_kernel(const OverlayTask& task, const uint32_t* candidates, uint32_t count, OverlayPiece* pieces,
-                        double* covered);
+                        OverlayCover* cover);
 namespace avx2 {
 uint32_t overlay_kernel(const OverlayTask& task, const uint32_t* candidates, uint32_t count, OverlayPiece* pieces,
-                        double* covered);
+                        OverlayCover* cover);
 }
 
 } // namespace packtrace

@@ -7,8 +7,8 @@
 namespace packtrace::avx2 {
 
 uint32_t overlay_kernel(const OverlayTask& task, const uint32_t* candidates, uint32_t count, OverlayPiece* pieces,
-                        double* covered) {
-  return lay_over(task, candidates, count, pieces, covered);
+                        OverlayCover* cover) {
+  return lay_over(task, candidates, count, pieces, cover);
 }
 
 } // namespace packtrace::avx2

@@ -140,11 +140,12 @@ struct Sides4 {
 }
 
 [[gnu::always_inline]] inline uint32_t lay_over(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
-                                                OverlayPiece* pieces, double* covered) {
+                                                OverlayPiece* pieces, OverlayCover* cover) {
   const OverlayPoint* corners[3][4];
   uint32_t waiting[4];
   uint32_t filled = 0, found = 0;
-  double sum = 0.0;
+  double sum = 0.0, most = 0.0;
+  *cover = {};
   for (uint32_t i = 0; i < count || filled > 0;) {
     if (i < count) {
       const uint32_t* p = task.corners + uint64_t{3} * candidates[i];
@@ -165,13 +166,14 @@ struct Sides4 {
     meet(a, b, c, area, height, facing, inner);
     for (uint32_t lane = 0; lane < filled; ++lane)
       if (facing[lane] > 0.0 && area[lane] > kTiny) {
+        if (area[lane] > most) most = area[lane], cover->largest = found;
         pieces[found++] = {waiting[lane], static_cast<uint32_t>(inner[lane]), height[lane]};
         sum += area[lane];
       }
     filled = 0;
     if (sum >= task.enough) break;
   }
-  *covered = sum;
+  cover->count = sum;
   return found;
 }
 

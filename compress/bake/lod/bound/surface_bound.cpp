@@ -100,7 +100,8 @@ private:
     if (mapped_[t] == 0) {
       simplified_.gather(source_.corner_points(t));
       entry.image.first = static_cast<uint32_t>(pieces_.size());
-      if (!simplified_.overlay(source_.corners(t), source_.surface().area_normal(t), pieces_)) {
+      if (!simplified_.overlay(source_.corners(t), source_.surface().area_normal(t), pieces_) &&
+          !simplified_.overlay().overlay_over_borders(pieces_)) {
         without_overlay_.push_back(t);
         return;
       }

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kSteep = 0.05;               // cosine; steeper triangles count as edge-on
 constexpr double kRounding = 1e-6;            // tolerance of the coverage, which is an integer
+constexpr double kLeastCoverage = 1e-3;       // of triangles that stick out over borders
 constexpr double kFullCoverage = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
 static_assert(sizeof(DVec3) == 3 * sizeof(double));
 
@@ -25,21 +26,15 @@ OverlayKernel pick_kernel() {
 /// Derivatives of the coordinates along one axis.
 OverlayPoint slopes(double l1, double l2, double height) { return {-(l1 + l2), l1, l2, height}; }
 
-/// A convex part of a surface triangle, in coordinates of the triangle laid over it. Has at most six corners, or nine
-/// with rounding errors.
-struct Polygon {
-  std::array<OverlayPoint, 9> corners;
-  size_t count;
-};
-
 double coordinate(const OverlayPoint& p, int i) { return i == 0 ? p.l0 : i == 1 ? p.l1 : p.l2; }
 
-/// Clips to where coordinate i is not negative.
-Polygon cut(const Polygon& in, int i) {
-  Polygon out{{}, 0};
+/// Clips to where a linear function is not negative.
+template <typename Function>
+OverlayPolygon cut(const OverlayPolygon& in, const Function& function) {
+  OverlayPolygon out{{}, 0};
   for (size_t k = 0; k < in.count; ++k) {
     const OverlayPoint &p = in.corners[k == 0 ? in.count - 1 : k - 1], &q = in.corners[k];
-    const double last = coordinate(p, i), next = coordinate(q, i);
+    const double last = function(p), next = function(q);
     if ((last < 0.0) != (next < 0.0)) {
       const double t = last / (last - next);
       out.corners[out.count++] = {p.l0 + t * (q.l0 - p.l0), p.l1 + t * (q.l1 - p.l1), p.l2 + t * (q.l2 - p.l2),
@@ -48,6 +43,11 @@ Polygon cut(const Polygon& in, int i) {
     if (next >= 0.0) out.corners[out.count++] = q;
   }
   return out;
+}
+
+/// Positive where a point is to the left of the line from p to q.
+double left_of(const OverlayPoint& p, const OverlayPoint& q, const OverlayPoint& at) {
+  return (q.l1 - p.l1) * (at.l2 - p.l2) - (q.l2 - p.l2) * (at.l1 - p.l1);
 }
 
 } // namespace
@@ -79,6 +79,7 @@ void Overlay::prepare() {
 bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
                       std::vector<OverlayPiece>& pieces) {
   static const OverlayKernel kernel = pick_kernel();
+  found_count_ = 0;
   const double length = glm::length(direction);
   if (!(length > 0.0) || candidates.empty()) return false;
   if (corners_.empty()) prepare();
@@ -101,19 +102,25 @@ bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std
 
   if (found_.size() < candidates.size()) found_.resize(candidates.size());
   task_.enough = kFullCoverage;
-  double covered = 0.0;
+  OverlayCover cover{};
   const auto find = [&] {
-    return kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &covered);
+    return kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &cover);
   };
   uint32_t count = find();
-  if (covered < 1.0 - kRounding) return false;
-  bool together = has_no_open_sides(std::span(found_).first(count));
-  if (!together && covered >= kFullCoverage && has_layers()) {
-    task_.enough = std::numeric_limits<double>::infinity();
-    count = find();
-    together = has_no_open_sides(std::span(found_).first(count));
+  if (cover.count < 1.0 - kRounding) {
+    if (cover.count > kLeastCoverage) found_count_ = count, largest_piece_ = cover.largest;
+    return false;
   }
-  if (!together || std::abs(covered - std::round(covered)) > kRounding) return false;
+  bool together = has_no_open_sides(std::span(found_).first(count));
+  if (!together) {
+    if (cover.count >= kFullCoverage) {
+      task_.enough = std::numeric_limits<double>::infinity();
+      count = find();
+      together = has_no_open_sides(std::span(found_).first(count));
+    }
+    if (!together) found_count_ = count, largest_piece_ = cover.largest;
+  }
+  if (!together || std::abs(cover.count - std::round(cover.count)) > kRounding) return false;
   pieces.insert(pieces.end(), found_.begin(), found_.begin() + count);
   return true;
 }
@@ -126,25 +133,66 @@ bool Overlay::has_no_open_sides(std::span<const OverlayPiece> pieces) {
       if ((piece.inner_sides >> i & 1) == 0) continue;
       const uint32_t* points = &corners_[size_t{3} * piece.triangle];
       const uint32_t from = points[i], to = points[i == 2 ? 0 : i + 1];
-      const auto back = std::find(open_sides_.begin(), open_sides_.end(), std::pair(to, from));
+      const auto back = std::find_if(open_sides_.begin(), open_sides_.end(),
+                                     [&](const OpenSide& side) { return side.from == to && side.to == from; });
       if (back == open_sides_.end())
-        open_sides_.emplace_back(from, to);
+        open_sides_.push_back({from, to, piece.triangle});
       else
         *back = open_sides_.back(), open_sides_.pop_back();
     }
   return open_sides_.empty();
 }
 
-/// Whether an open side occurs twice, as where the surface has several layers.
-bool Overlay::has_layers() {
-  std::sort(open_sides_.begin(), open_sides_.end());
-  return std::adjacent_find(open_sides_.begin(), open_sides_.end()) != open_sides_.end();
+bool Overlay::overlay_over_borders(std::vector<OverlayPiece>& pieces) {
+  if (found_count_ == 0) return false;
+  const std::span<const OverlayPiece> found = std::span(found_).first(found_count_);
+  has_no_open_sides(found); // sets open_sides_
+  const OverlayPoint covered = point_in(found[largest_piece_]);
+  pieces.insert(pieces.end(), found.begin(), found.end());
+  for (const OpenSide& side : open_sides_)
+    if (const double distance = distance_beyond(side, covered); distance >= 0.0)
+      pieces.push_back({side.triangle, OverlayPiece::kBeyondSide, distance});
+  return true;
+}
+
+OverlayPolygon Overlay::overlap(const OverlayPiece& piece) const {
+  const uint32_t* points = &corners_[size_t{3} * piece.triangle];
+  OverlayPolygon polygon{{projected_[points[0]], projected_[points[1]], projected_[points[2]]}, 3};
+  for (int i = 0; i < 3; ++i) polygon = cut(polygon, [i](const OverlayPoint& p) { return coordinate(p, i); });
+  return polygon;
+}
+
+/// The centroid of a piece's corners.
+OverlayPoint Overlay::point_in(const OverlayPiece& piece) const {
+  const OverlayPolygon polygon = overlap(piece);
+  const double share = 1.0 / static_cast<double>(std::max<size_t>(polygon.count, 1));
+  OverlayPoint result{};
+  for (size_t i = 0; i < polygon.count; ++i)
+    result.l1 += share * polygon.corners[i].l1, result.l2 += share * polygon.corners[i].l2;
+  return result;
+}
+
+/// The largest distance, from an open side's candidate, of the overlaid triangle's part that is beyond the side as seen
+/// from a covered point; negative if there is none.
+double Overlay::distance_beyond(const OpenSide& side, const OverlayPoint& covered) const {
+  const OverlayPoint &p = projected_[side.from], &q = projected_[side.to];
+  if (!(left_of(p, q, covered) > 0.0)) return -1.0;
+  OverlayPolygon part{{OverlayPoint{1.0, 0.0, 0.0, 0.0}, {0.0, 1.0, 0.0, 0.0}, {0.0, 0.0, 1.0, 0.0}}, 3};
+  part = cut(part, [&](const OverlayPoint& at) { return -left_of(p, q, at); });
+  part = cut(part, [&](const OverlayPoint& at) { return left_of(covered, p, at); });
+  part = cut(part, [&](const OverlayPoint& at) { return -left_of(covered, q, at); });
+  double largest = -1.0;
+  for (size_t i = 0; i < part.count; ++i) {
+    const OverlayPoint& c = part.corners[i];
+    const DVec3 on = triangle_[0] + c.l1 * (triangle_[1] - triangle_[0]) + c.l2 * (triangle_[2] - triangle_[0]);
+    largest = std::max(largest, surface_.distance(on, side.triangle));
+  }
+  return largest;
 }
 
 double Overlay::nearest_distance(const OverlayPiece& piece) const {
-  const uint32_t* points = &corners_[size_t{3} * piece.triangle];
-  Polygon polygon{{projected_[points[0]], projected_[points[1]], projected_[points[2]]}, 3};
-  for (int i = 0; i < 3; ++i) polygon = cut(polygon, i);
+  if (piece.inner_sides == OverlayPiece::kBeyondSide) return piece.distance; // measured to nearest points
+  const OverlayPolygon polygon = overlap(piece);
   const DVec3 e1 = triangle_[1] - triangle_[0], e2 = triangle_[2] - triangle_[0];
   double largest = 0.0;
   for (size_t i = 0; i < polygon.count; ++i) {

@@ -92,11 +92,12 @@ double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, doub
   return std::min(by_overlay, by_cutting);
 }
 
-/// Bounds the part by an overlay, in mapped_triangles_. Returns false if the candidates do not cover it.
+/// Bounds the part by an overlay, in mapped_triangles_. Returns false if the candidates cover none of it.
 bool UncoveredBound::overlay(const Corners& part, double& stated) {
   mapped_triangles_.clear();
   const DVec3 normal = glm::cross(part[1] - part[0], part[2] - part[0]);
-  if (!source_.overlay(part, normal, mapped_triangles_)) return false;
+  if (!source_.overlay(part, normal, mapped_triangles_) && !source_.overlay().overlay_over_borders(mapped_triangles_))
+    return false;
   stated = 0.0;
   for (OverlayPiece& piece : mapped_triangles_) {
     const double inherited = this->inherited(piece.triangle);
