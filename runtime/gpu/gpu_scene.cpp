@@ -8,6 +8,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/gpu/gpu_scene_state.h"
 #include "runtime/gpu/shaders/spirv.h"
+#include "runtime/gpu/top_nodes.h"
 
 namespace packtrace::gpu {
 namespace {
@@ -59,11 +60,12 @@ void GpuScene::State::upload_all(const SceneTables& t) {
 /// room for all new ones. Returns whether some were replaced.
 bool GpuScene::State::replace_buffers(const SceneTables& t) {
   const uint64_t placement_bytes = (t.placements.size() + 1) * sizeof(packed::TracePlacement);
-  if (scene.bytes() != 0 && placement_bytes <= placements.bytes() && t.top_nodes.size_bytes() <= top_nodes.bytes() &&
+  const uint64_t top_node_bytes = t.top_nodes.size() * sizeof(TopNodeRecord);
+  if (scene.bytes() != 0 && placement_bytes <= placements.bytes() && top_node_bytes <= top_nodes.bytes() &&
       t.masks.size_bytes() <= masks.bytes())
     return false;
   StagedBuffer new_placements(device, placement_bytes, "placements"),
-      new_top_nodes(device, t.top_nodes.size_bytes(), "the tree over placements"),
+      new_top_nodes(device, top_node_bytes, "the tree over placements"),
       new_scene(device, sizeof(SceneRecord), "the scene's record");
   if (masks.bytes() == 0 || t.masks.size_bytes() > masks.bytes()) {
     masks = upload_span(device, t.masks, "masks");
@@ -89,9 +91,10 @@ void GpuScene::State::upload_placements(const SceneTables& t) {
   uploaded_bytes = 0;
   std::vector<packed::TracePlacement> all(t.placements.begin(), t.placements.end());
   all.push_back(t.top);
+  const std::vector<TopNodeRecord> top = pack_top_nodes(t.top_nodes);
   Commands commands;
   uploaded_bytes += placements.write_changes(commands, std::as_bytes(std::span(all)), sizeof all[0]);
-  uploaded_bytes += top_nodes.write_changes(commands, std::as_bytes(t.top_nodes), sizeof(packed::TopNode));
+  uploaded_bytes += top_nodes.write_changes(commands, std::as_bytes(std::span(top)), sizeof top[0]);
   uploaded_bytes += scene.write_changes(commands, std::as_bytes(std::span(&t.scene, 1)), sizeof t.scene);
   if (uploaded_bytes > 0) device->run(commands);
   upload_materials(t);

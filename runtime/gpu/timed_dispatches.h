@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -64,33 +65,41 @@ private:
   uint64_t most_;
 };
 
-/// Chooses between two kernels with the same results by the times of their dispatches. Which one is faster depends on
-/// how many rays a dispatch has.
+/// Chooses between two kernels with the same results. Parts of a picture differ in cost and clocks change, so only
+/// dispatches that follow each other are compared. Which kernel is faster depends on how many rays a dispatch has.
 class FasterKernel {
 public:
   /// Number of the kernel of the next dispatch. Both have turns at first, and the slower one now and then.
   size_t next(uint64_t rays) {
-    Times& times = times_[std::bit_width(rays)];
-    const size_t turn = times.dispatches++;
+    Trials& trials = trials_[std::bit_width(rays)];
+    const size_t turn = trials.dispatches++;
     if (turn < kFirstTurns) return turn % 2;
-    const size_t faster = times.ms_per_ray[1] < times.ms_per_ray[0] ? 1 : 0;
-    return turn % kTurns == 0 ? 1 - faster : faster;
+    const size_t faster = trials.log_ratio < 0.0 ? 1 : 0;
+    const size_t turns = std::abs(trials.log_ratio) < kClose ? kTurnsIfClose : kTurns;
+    return turn % turns == 0 ? 1 - faster : faster;
   }
   void add(size_t kernel, uint64_t rays, double ms) {
-    double& known = times_[std::bit_width(rays)].ms_per_ray[kernel];
-    const double now = ms / static_cast<double>(rays);
-    known = known == 0.0 ? now : std::min(now, kForget * known); // a slow one may be the clock's fault
+    Trials& trials = trials_[std::bit_width(rays)];
+    const double now = std::max(ms, 1e-6) / static_cast<double>(rays);
+    if (trials.last_ms_per_ray > 0.0 && kernel != trials.last_kernel) {
+      const double ratio = kernel == 1 ? now / trials.last_ms_per_ray : trials.last_ms_per_ray / now;
+      trials.log_ratio += (std::log(ratio) - trials.log_ratio) * std::max(kMinShare, 1.0 / ++trials.comparisons);
+    }
+    trials.last_kernel = kernel, trials.last_ms_per_ray = now;
   }
 
 private:
-  static constexpr size_t kFirstTurns = 6, kTurns = 64;
-  static constexpr double kForget = 1.1;
+  static constexpr size_t kFirstTurns = 6, kTurns = 64, kTurnsIfClose = 16;
+  static constexpr double kClose = 0.2;    ///< of log_ratio
+  static constexpr double kMinShare = 0.3; ///< of a comparison in log_ratio
 
-  struct Times {
-    std::array<double, 2> ms_per_ray{};
-    size_t dispatches = 0;
+  struct Trials {
+    double log_ratio = 0.0; ///< of the time of kernel 1 to that of kernel 0
+    double last_ms_per_ray = 0.0;
+    size_t last_kernel = 0, dispatches = 0;
+    int comparisons = 0;
   };
-  std::array<Times, 65> times_; ///< by the number of bits of the number of rays
+  std::array<Trials, 65> trials_; ///< by the number of bits of the number of rays
 };
 
 } // namespace packtrace::gpu

@@ -36,6 +36,18 @@ struct TreeRecord {
   uint32_t reserved;
 };
 
+/// A node of the tree over placements, with the words of a baked::PackedNode where kernels read both alike.
+struct TopNodeRecord {
+  float origin[3];
+  uint32_t ray_classes; ///< all << 16
+  uint32_t reserved;
+  uint32_t exponents; ///< of the units of the boxes: x | y << 8 | z << 16, each plus 127
+  uint32_t kind;      ///< baked::kInnerChild
+  uint32_t reserved2;
+  uint8_t lo[3][baked::kNodeWidth], hi[3][baked::kNodeWidth]; ///< as PackedNode's, in units from the origin
+  uint32_t child[baked::kNodeWidth];                          ///< as packed::TopNode's
+};
+
 /// A cluster in the table that translates the triangles of an acceleration structure.
 struct RangeRecord {
   uint32_t first_triangle; ///< of the geometry of the structure

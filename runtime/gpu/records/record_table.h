@@ -49,14 +49,6 @@ inline constexpr std::array kPlacementFields = {
 };
 static_assert(offsetof(packed::TracePlacement, aligned) == offsetof(packed::TracePlacement, ray_classes) + 2);
 
-inline constexpr std::array kTopNodeFields = {
-    GlslField{"float", "lo", offsetof(packed::TopNode, lo), 24},
-    GlslField{"float", "hi", offsetof(packed::TopNode, hi), 24},
-    GlslField{"uint", "child", offsetof(packed::TopNode, child), 8},
-    GlslField{"uint", "slots", offsetof(packed::TopNode, slots)},
-    GlslField{"uint", "padding", offsetof(packed::TopNode, slots) + 4, 7},
-};
-
 inline constexpr std::array kRayFields = {
     GlslField{"float", "origin", offsetof(packed::KernelRay, origin), 3},
     GlslField{"float", "tnear", offsetof(packed::KernelRay, tnear)},
@@ -209,7 +201,6 @@ inline constexpr std::array kDenoiseFields = {
 
 inline constexpr std::array kRecords = {
     GlslRecord{"PlacementRecord", sizeof(packed::TracePlacement), kPlacementFields},
-    GlslRecord{"TopNode", sizeof(packed::TopNode), kTopNodeFields},
     GlslRecord{"RayRecord", sizeof(packed::KernelRay), kRayFields},
     GlslRecord{"HitRecord", sizeof(packed::KernelHit), kHitFields},
     GlslRecord{"ClusterRecord", sizeof(ClusterRecord), kClusterFields},
@@ -233,15 +224,15 @@ constexpr bool same_layouts() {
 }
 static_assert(same_layouts(), "GLSL would lay out a record differently from C++");
 
-static_assert(sizeof(packed::TopNode) == 256 && offsetof(packed::TopNode, lo) == 0 &&
-              offsetof(packed::TopNode, hi) == 96);
-
 // Kernels read nodes as vectors of four words, and the records of the mask buffer as words.
 static_assert(sizeof(baked::PackedNode) == 80 && offsetof(baked::PackedNode, exponents) == 12 &&
               offsetof(baked::PackedNode, ray_classes) == 14 && offsetof(baked::PackedNode, first_triangle) == 15 &&
               offsetof(baked::PackedNode, first_child) == 16 && offsetof(baked::PackedNode, cluster) == 20 &&
               offsetof(baked::PackedNode, children) == 24 && offsetof(baked::PackedNode, lo) == 32 &&
               offsetof(baked::PackedNode, hi) == 56);
+static_assert(sizeof(TopNodeRecord) == 112 && offsetof(TopNodeRecord, exponents) == 20 &&
+              offsetof(TopNodeRecord, lo) == offsetof(baked::PackedNode, lo) &&
+              offsetof(TopNodeRecord, hi) == offsetof(baked::PackedNode, hi) && offsetof(TopNodeRecord, child) == 80);
 static_assert(sizeof(MaskedCluster) == 8 && sizeof(MaskMaterial) == 8 && sizeof(MaskImage) == 32);
 
 } // namespace packtrace::gpu

@@ -4,7 +4,8 @@
 //
 // A thread walks a ray's nodes and puts the leaves it reaches into its subgroup's queue. Once that is long enough, or no
 // ray goes on, the subgroup's lanes set up a leaf each, then decode a corner each, then test a pair of ray and triangle
-// each. Shared memory limits how many subgroups are there at once, so rays and leaves stay in registers and are shuffled.
+// each. Leaves stay in registers and are shuffled, and so do the rays of a single placement. With many placements a ray
+// steps through the tree over them as through a placed tree, so that rays in both share their instructions.
 // Subgroups have 4 to 32 lanes, and nodes numbers below 2^24. No cluster is masked.
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -53,77 +54,9 @@ uint nth_bit(uint mask, uint n) {
   return at + (n >= (mask & 1u) ? 1u : 0u);
 }
 
-const uint kStepTree = 0u, kStepTop = 1u, kEnter = 2u; // what a subgroup does
-const uint kNoPlacement = 0xffffffffu;
-
-// --- a ray's way through the scene, which may stop at any node ---
-struct Way {
-  bool in_tree;
-  uint first, group, size;  // of the tree: nodes that are left, stack entries
-  uint base;                // stack entries of the tree over placements
-  uint top_node, top_group; // of the tree over placements
-  uint next;                // placement to enter; kNoPlacement: none
-  uint tree_first, tree_flags;
-};
-
-bool enter_placement(UnitRay u, uint placement, inout Way way, inout GridRay r) {
-  if ((placements[placement].classes_aligned & kOcclusionClass) == 0u) return false;
-  TreeRecord tree = trees[placements[placement].tree];
-  float pad = (kAnyGraded && (tree.flags & kGraded) != 0u ? kGradedPad : 1.0) * tree.max_coordinate;
-  way.tree_first = way.first = tree.first_node;
-  way.tree_flags = tree.flags;
-  way.group = kRootGroup;
-  way.size = way.base;
-  return enter(u, placement, tree.max_coordinate, pad, kMinDirection, r);
-}
-
-// Returns whether the ray may hit something.
-bool begin_way(UnitRay u, out Way way, inout GridRay top, inout GridRay r) {
-  way = Way(false, 0u, 0u, 0u, 0u, 0u, 0u, kNoPlacement, 0u, 0u);
-  if (scene.placement_count == 0u) return false;
-  if (!kManyPlacements) {
-    way.in_tree = enter_placement(u, 0u, way, r);
-    return way.in_tree;
-  }
-  if (!enter(u, scene.placement_count, scene.top_max_coordinate, scene.top_pad_coordinate, kMinTopDirection, top))
-    return false;
-  float t[8];
-  way.top_group = pass_top_boxes(top, 0u, t);
-  return way.top_group != 0u;
-}
-
-// A step in the tree over placements. Returns false at its end.
-bool step_top(GridRay top, inout Way way) {
-  if (way.top_group == 0u) {
-    if (way.base == 0u) return false;
-    --way.base;
-    way.top_node = stack[way.base].x;
-    way.top_group = stack[way.base].y;
-  }
-  uint child = top_nodes[way.top_node].child[take_slot(way.top_group)];
-  if ((child & kTopLeaf) != 0u) {
-    way.next = child & ~kTopLeaf;
-  } else {
-    float t[8];
-    if (way.top_group != 0u) stack[way.base++] = uvec2(way.top_node, way.top_group);
-    way.top_node = child;
-    way.top_group = pass_top_boxes(top, child, t);
-  }
-  return true;
-}
+#include "ray_steps.glsl"
 
 // --- pairs ---
-// The ray of another lane; all lanes together.
-GridRay ray_of(GridRay r, uint lane) {
-  GridRay p = r;
-  p.origin = subgroupShuffle(r.origin, lane);
-  p.begin = kMayBeFar ? subgroupShuffle(r.begin, lane) : 0.0;
-  p.end = subgroupShuffle(r.end, lane);
-  p.shear = subgroupShuffle(r.shear, lane);
-  p.major = subgroupShuffle(r.major, lane);
-  p.rest = vec3(0.0);
-  return p;
-}
 Corner shared_corner(GridRay p, uint at) { // at: of the first float
   uint kx = p.major, ky = kx == 2u ? 0u : kx + 1u, kz = kx == 0u ? 2u : kx - 1u;
   return make_corner(p, vec3(uintBitsToFloat(s_corner[at + kx]), uintBitsToFloat(s_corner[at + ky]),
@@ -191,7 +124,7 @@ void flush_leaves(GridRay r, uint tree_flags, uint e0, uint total) {
       uint owner = bitCount(subgroupBallot(in_batch && n_from < k0).x) + through_lane(mark) - 1u, k = k0 + LANE;
       if (gaps) owner = subgroupShuffle(nth, owner);
       uint pair = subgroupShuffle(e_pair, owner), turns = subgroupShuffle(my_turns, owner), lane = (pair >> 20) & 31u;
-      GridRay p = ray_of(r, lane);
+      GridRay p = ray_for_tests(r, lane);
       uint flags = kAnyFine ? subgroupShuffle(tree_flags, lane) : 0u;
       if (k < all_n) {
         uvec3 q = triangle_corners(turns, (pair >> 10) & 1023u, k - (pair & 1023u));
@@ -222,7 +155,7 @@ void main() {
   bool alive = valid && s < end, tracing = false, pending = false;
   uint count = 0u, held = 0u, held_node = 0u;
   UnitRay u;
-  GridRay r, top;
+  GridRay r;
   Way way;
   if (LANE == 0u) s_hit[gl_SubgroupID] = 0u;
   sync_shared();
@@ -234,65 +167,40 @@ void main() {
       if (alive && !tracing && !pending) {
         Point point = read_point(number); // again for each ray: it would take twelve registers all the way
         u = unit_ray(point.origin, sample_direction(point, s), 0.0, push.tfar);
-        tracing = begin_way(u, way, top, r);
+        tracing = begin_way(u, way, r);
         ended = !tracing;
       }
     }
     if (!subgroupAny(tracing || pending || ended)) break;
-    bool walking, stalled = false;
+    bool walking;
     do {
-      // A lane does not leave a placement while leaves of it wait: they need the ray in its grid.
-      walking = tracing && held == 0u && !(kManyPlacements && !way.in_tree && pending);
-      uint action = kStepTree;
-      if (kManyPlacements) { // what most lanes can do; the others wait
-        uint in_tree = bitCount(subgroupBallot(walking && way.in_tree).x);
-        uint entering = bitCount(subgroupBallot(walking && !way.in_tree && way.next != kNoPlacement).x);
-        uint above = bitCount(subgroupBallot(walking && !way.in_tree && way.next == kNoPlacement).x);
-        if (entering > above && entering > in_tree)
-          action = kEnter;
-        else if (above > in_tree)
-          action = kStepTop;
-      }
-      if (walking) {
-        if (kManyPlacements && !way.in_tree) {
-          if (action == kEnter && way.next != kNoPlacement) {
-            way.in_tree = enter_placement(u, way.next, way, r);
-            way.next = kNoPlacement;
-          } else if (action == kStepTop && way.next == kNoPlacement) {
-            tracing = step_top(top, way);
-            ended = ended || !tracing;
-          }
-        } else if (kManyPlacements && action != kStepTree) {
-          // waits for the others
-        } else if (way.group == 0u && way.size == way.base) {
+      walking = tracing && held == 0u && way.next == kNoPlacement;
+      // Leaves that wait are tested with the ray in the grid of its placement, so it enters no other until then.
+      bool entering = kManyPlacements && tracing && way.next != kNoPlacement && !pending;
+      bool enters = kManyPlacements && // what most lanes can do; the others wait
+                    bitCount(subgroupBallot(entering).x) > bitCount(subgroupBallot(walking).x);
+      if (enters) {
+        if (entering) {
+          enter_placement(u, way.next, way, r);
+          way.next = kNoPlacement;
+        }
+      } else if (walking) {
+        if (kManyPlacements && way.in_tree && way.group == 0u && way.size == way.base) {
           way.in_tree = false;
-          if (!kManyPlacements) {
+          way.base = 0u;
+          restore_top(r);
+        }
+        if (way.group == 0u) {
+          if (way.size == way.base) {
             tracing = false;
             ended = !pending;
-          }
-        } else {
-          if (way.group == 0u) {
+          } else {
             --way.size;
             way.first = stack[way.size].x;
             way.group = stack[way.size].y;
           }
-          uint node = way.first + take_slot(way.group);
-          Node n = read_node(node);
-          float t[8];
-          uint mask = ((n.n0.w >> 16) & kOcclusionClass) == 0u
-                          ? 0u
-                          : pass_boxes(r, n, kAnyGraded && (way.tree_flags & kGraded) != 0u, t);
-          if (mask != 0u) {
-            if ((n.n1.z & 255u) == kInnerChild) {
-              if (way.group != 0u) stack[way.size++] = uvec2(way.first, way.group);
-              way.first = way.tree_first + n.n1.x;
-              way.group = mask;
-            } else {
-              held = mask;
-              held_node = node;
-            }
-          }
         }
+        if (way.group != 0u) held = step(r, way, held_node);
       }
       // A leaf of each lane in turn.
       for (uint b = subgroupBallot(held != 0u).x; b != 0u && !full;) {
@@ -306,13 +214,10 @@ void main() {
         b = subgroupBallot(held != 0u).x;
         full = count == room && b != 0u;
       }
-      walking = tracing && held == 0u && !(kManyPlacements && !way.in_tree && pending);
-      // Rays that wait to leave their placements.
-      if (kManyPlacements) stalled = bitCount(subgroupBallot(pending && !walking).x) >= S / 2u;
-    } while (count < S && !full && !stalled && subgroupAny(walking) &&
-
+      walking = tracing && held == 0u && !(kManyPlacements && way.next != kNoPlacement && pending);
+    } while (count < S && !full && subgroupAny(walking) &&
              (push.idle_lanes >= S || bitCount(subgroupBallot(ended && s + 1u < end).x) < push.idle_lanes));
-    if (count != 0u && (full || stalled || count >= S || !subgroupAny(walking))) {
+    if (count != 0u && (full || count >= S || !subgroupAny(walking))) {
       sync_shared();
       // Whole subgroups of leaves; the rest waits where rays go on.
       uint ending = subgroupAny(walking) && count >= S ? count - count % S : count;

@@ -55,6 +55,13 @@ Node read_node(uint number) {
   uint at = 5u * number;
   return Node(nodes[at], nodes[at + 1u], nodes[at + 2u], nodes[at + 3u], nodes[at + 4u]);
 }
+// A node of the tree over placements.
+Node read_top_node(uint number) {
+  uint at = 7u * number;
+  return Node(top_nodes[at], top_nodes[at + 1u], top_nodes[at + 2u], top_nodes[at + 3u], top_nodes[at + 4u]);
+}
+// The number of its child, or kTopLeaf + a placement.
+uint top_child(uint number, uint slot) { return top_words[28u * number + 20u + slot]; }
 
 // Bytes 0 and 2 of a word, in units of 2^-24 with kHalfBytes.
 vec2 even_bytes(uint word) {
@@ -63,9 +70,12 @@ vec2 even_bytes(uint word) {
 }
 
 // The children whose boxes the ray passes, as a bit mask, and where it enters them.
-uint pass_boxes(GridRay r, Node n, bool graded, inout float t[8]) {
-  vec3 unit = uintBitsToFloat((((uvec3(n.n0.w, n.n0.w >> 5, n.n0.w >> 10)) & 31u) + 127u) << 23);
-  vec3 o = vec3(ivec3(n.n0.xyz)), a = unit * r.inverse;
+// top: of the tree over placements, whose nodes have float origins
+uint pass_boxes(GridRay r, Node n, bool top, bool graded, inout float t[8]) {
+  uvec3 exponents = top ? uvec3(n.n1.y, n.n1.y >> 8, n.n1.y >> 16) & 255u
+                        : (uvec3(n.n0.w, n.n0.w >> 5, n.n0.w >> 10) & 31u) + 127u;
+  vec3 unit = uintBitsToFloat(exponents << 23), a = unit * r.inverse;
+  vec3 o = top ? uintBitsToFloat(n.n0.xyz) : vec3(ivec3(n.n0.xyz));
   vec3 near_bias = fma(o, r.inverse, r.near_bias), far_bias = fma(o, r.inverse, r.far_bias);
   if (kAnyGraded && graded) { // beam.h: enlarge_boxes(); 4 u more for the sums here
     vec3 most = max(abs(o), abs(o + 255.0 * unit));
@@ -199,7 +209,7 @@ bool trace_placement(inout UnitRay u, inout Best best, uint placement, uint base
     Node n = read_node(first + take_slot(group));
     if (((n.n0.w >> 16) & ray_class) == 0u) continue;
     float t[8];
-    uint mask = pass_boxes(r, n, graded, t);
+    uint mask = pass_boxes(r, n, false, graded, t);
     if (mask == 0u) continue;
     if ((n.n1.z & 255u) == kInnerChild) {
       if (group != 0u) stack[size++] = uvec2(first, group);
@@ -211,27 +221,6 @@ bool trace_placement(inout UnitRay u, inout Best best, uint placement, uint base
   }
 }
 
-// The children of a node over placements whose boxes the ray passes.
-uint pass_top_boxes(GridRay r, uint number, inout float t[8]) {
-  bvec3 back = lessThan(r.inverse, vec3(0.0));
-  uint mask = 0u;
-  [[unroll]] for (uint h = 0u; h < 2u; ++h) { // planes of four children at a time
-    uint lo = 16u * number + h, hi = lo + 6u;
-    vec4 lx = top_planes[lo], ly = top_planes[lo + 2u], lz = top_planes[lo + 4u];
-    vec4 hx = top_planes[hi], hy = top_planes[hi + 2u], hz = top_planes[hi + 4u];
-    [[unroll]] for (uint j = 0u; j < 4u; ++j) {
-      vec3 a = vec3(lx[j], ly[j], lz[j]), b = vec3(hx[j], hy[j], hz[j]);
-      vec3 t0 = fma(mix(a, b, back), r.inverse, r.near_bias), t1 = fma(mix(b, a, back), r.inverse, r.far_bias);
-      float begin = max(max(t0.x, t0.y), max(t0.z, r.begin)), end = min(min(t1.x, t1.y), min(t1.z, r.end));
-      if (begin <= end) mask |= 1u << (4u * h + j);
-#ifdef CLOSEST
-      t[4u * h + j] = begin;
-#endif
-    }
-  }
-  return mask & top_nodes[number].slots;
-}
-
 // Traces a ray through the whole scene. Returns whether it hits; for nearest hits, u.tmax and `best` say where.
 bool trace(inout UnitRay u, inout Best best, uint ray_class) {
   if (scene.placement_count == 0u) return false;
@@ -241,7 +230,7 @@ bool trace(inout UnitRay u, inout Best best, uint ray_class) {
     return false;
   uint node = 0u, size = 0u;
   float t[8];
-  uint group = group_of(pass_top_boxes(top, 0u, t), t);
+  uint group = group_of(pass_boxes(top, read_top_node(0u), true, false, t), t);
   for (;;) {
     // Rays look for their next placements first, so that those of a subgroup enter them together.
     uint child = 0u;
@@ -253,11 +242,11 @@ bool trace(inout UnitRay u, inout Best best, uint ray_class) {
         group = stack[size].y;
         continue;
       }
-      child = top_nodes[node].child[take_slot(group)];
+      child = top_child(node, take_slot(group));
       if ((child & kTopLeaf) != 0u) break;
       if (group != 0u) stack[size++] = uvec2(node, group);
       node = child;
-      group = group_of(pass_top_boxes(top, node, t), t);
+      group = group_of(pass_boxes(top, read_top_node(node), true, false, t), t);
     }
     // The group that is left waits in its variables, above the stack.
     if (trace_placement(u, best, child & ~kTopLeaf, size, ray_class)) return true;
