@@ -1,19 +1,16 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 
 #include "runtime/denoise/kernels/units.h"
 #include "runtime/denoise/plane.h"
 
 namespace packtrace {
 
-/// Returns 1 / z, or 0 if z is not a positive normal finite number.
-inline float disparity_of(float z) {
-  return z >= std::numeric_limits<float>::min() && z <= std::numeric_limits<float>::max() ? 1.0f / z : 0.0f;
-}
+/// Returns 1 / z, or 0 if no surface may have depth z.
+inline float disparity_of(float z) { return z >= kNearestDepth && z <= kFarthestDepth ? 1.0f / z : 0.0f; }
 
-/// The G-buffer channels that the filters use, as planes. A depth that is not positive and finite is stored as
+/// The G-buffer channels that the filters use, as planes. A depth that no surface may have is stored as
 /// disparity 0, which means a miss. A normal that is not finite, or far from a unit vector, is stored as a zero vector,
 /// which gets weight 0 in blurs and in reprojection.
 struct Guides {

@@ -9,6 +9,7 @@
 
 #include "runtime/denoise/kernels/history_rows.h"
 #include "runtime/denoise/kernels/row_math.h"
+#include "runtime/denoise/kernels/units.h"
 
 namespace packtrace {
 namespace {
@@ -40,8 +41,8 @@ void locate_pixels(int width, const MovingRow& row, const LocateTerms& terms, co
     bool seen = now > 0.0f;
     if constexpr (kMovedInDepth) {
       const float z = r.previous_z[x];
-      seen &= (z >= kSmallest) & (z <= kLargest);
-      before = 1.0f / lesser(greater(z, kSmallest), kLargest);
+      seen &= (z >= kNearestDepth) & (z <= kFarthestDepth);
+      before = 1.0f / lesser(greater(z, kNearestDepth), kFarthestDepth);
     }
     // False for NaN, too. The conversions to integers below cannot overflow.
     const bool inside = (from_x > -1.0f) & (from_x < t.width) & (from_y > -1.0f) & (from_y < t.height) & seen;

@@ -71,6 +71,8 @@ void write_denoiser_constants(std::ostream& out) {
   write(out, "kStratified", kStratified);
   write(out, "kLastPass", kLastPass);
   write(out, "kStillMotion", kStillMotion);
+  write(out, "kNearestDepth", kNearestDepth);
+  write(out, "kFarthestDepth", kFarthestDepth);
   write(out, "kNormalUnit", kNormalUnit);
   write(out, "kMomentUnits", kMomentUnits);
   write(out, "kMinHistoryWeight", kMinHistoryWeight);

@@ -25,7 +25,7 @@ float quotient(float a, float b) {
 }
 
 // --- guides: disparity, normal x | y << 16, normal z, instance ---
-float disparity_of(float z) { return z >= kSmallest && z <= kLargest ? quotient(1.0, z) : 0.0; }
+float disparity_of(float z) { return z >= kNearestDepth && z <= kFarthestDepth ? quotient(1.0, z) : 0.0; }
 int low_half(uint word) { return bitfieldExtract(int(word), 0, 16); }
 ivec3 normal_of(uint xy, uint z) { return ivec3(low_half(xy), int(xy) >> 16, low_half(z)); }
 int dot_of(ivec3 a, ivec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }

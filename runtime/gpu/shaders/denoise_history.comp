@@ -58,8 +58,8 @@ Located locate(ivec2 p, float now, vec2 motion, bool still) {
   bool seen = now > 0.0;
   if (has(kHasPreviousZ)) {
     float z = previous_z[index_of(p)];
-    seen = seen && z >= kSmallest && z <= kLargest;
-    before = quotient(1.0, lesser(greater(z, kSmallest), kLargest));
+    seen = seen && z >= kNearestDepth && z <= kFarthestDepth;
+    before = quotient(1.0, lesser(greater(z, kNearestDepth), kFarthestDepth));
   }
   l.found = from.x > -1.0 && from.x < float(terms.width) && from.y > -1.0 && from.y < float(terms.height) && seen;
   vec2 at = l.found ? from : vec2(0.0), whole = floor(at);
