@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "pbrt_import/scene/image_size.h"
 #include "runtime/trace/movers.h"
 #include "tests/benchmarks/trace_benchmark_inputs.h"
 
