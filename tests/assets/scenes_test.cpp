@@ -14,7 +14,7 @@
 namespace packtrace::scenegen {
 namespace {
 
-const std::filesystem::path kAssets = std::filesystem::path(PACKTRACE_SOURCE_DIR) / "assets";
+const std::filesystem::path kShippedScenes = std::filesystem::path(PACKTRACE_SOURCE_DIR) / "assets";
 
 std::string complaints(const Diagnostics& diagnostics) {
   std::string text;
@@ -35,7 +35,7 @@ ImportResult import_quietly(const std::filesystem::path& path) {
 
 TEST(CommittedScenes, FeaturesImportWithoutComplaint) {
   size_t count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(kAssets / "features")) {
+  for (const auto& entry : std::filesystem::directory_iterator(kShippedScenes / "features")) {
     if (entry.path().extension() != ".pbrt") continue;
     ++count;
     const Scene scene = import_quietly(entry.path()).scene;
@@ -47,7 +47,7 @@ TEST(CommittedScenes, FeaturesImportWithoutComplaint) {
 }
 
 TEST(CommittedScenes, RoomImportsWithoutComplaint) {
-  const Scene scene = import_quietly(kAssets / "room/room.pbrt").scene;
+  const Scene scene = import_quietly(kShippedScenes / "room/room.pbrt").scene;
   EXPECT_EQ(scene.masks.size(), 1u);
   EXPECT_GT(scene.instances.size(), 500u);
 }
@@ -57,7 +57,7 @@ TEST(CommittedScenes, TexturedHasFiveTexturesAMaskAndABumpMap) {
   Progress progress;
   ImportOptions options;
   options.keep_textures = true;
-  const Scene scene = import_scene(kAssets / "textured/textured.pbrt", options, diagnostics, progress).scene;
+  const Scene scene = import_scene(kShippedScenes / "textured/textured.pbrt", options, diagnostics, progress).scene;
   EXPECT_EQ(complaints(diagnostics), "");
   EXPECT_EQ(scene.textures.size(), 5u);
   EXPECT_EQ(scene.masks.size(), 1u);
@@ -67,7 +67,7 @@ TEST(CommittedScenes, TexturedHasFiveTexturesAMaskAndABumpMap) {
 }
 
 TEST(CommittedScenes, ExtremeKeepsItsSmallestAndItsLargest) {
-  const Scene scene = import_quietly(kAssets / "extreme/extreme.pbrt").scene;
+  const Scene scene = import_quietly(kShippedScenes / "extreme/extreme.pbrt").scene;
   std::vector<float> sizes;
   for (const Instance& instance : scene.instances) sizes.push_back(glm::length(instance.world_from_object[0]));
   EXPECT_LT(*std::min_element(sizes.begin(), sizes.end()), 1e-6f);

@@ -10,13 +10,13 @@
 namespace packtrace {
 namespace {
 
-struct Encoded {
+struct EncodedIndices {
   Strips strips;
   std::vector<uint8_t> bytes; // followed by kReadSlackBytes
 };
 
-Encoded encode(std::span<const Triangle> triangles, uint32_t vertex_count) {
-  Encoded result{find_strips(triangles, vertex_count), {}};
+EncodedIndices encode(std::span<const Triangle> triangles, uint32_t vertex_count) {
+  EncodedIndices result{find_strips(triangles, vertex_count), {}};
   BitWriter writer;
   write_strips(result.strips, writer);
   EXPECT_EQ(writer.bit_count(), result.strips.layout.total_bits());
@@ -33,7 +33,7 @@ std::array<uint32_t, 3> rotated_to_smallest(Triangle t) {
 
 /// Decodes in both ways and compares with the source, up to rotation of each triangle.
 void expect_round_trip(std::span<const Triangle> triangles, uint32_t vertex_count) {
-  const Encoded e = encode(triangles, vertex_count);
+  const EncodedIndices e = encode(triangles, vertex_count);
   ASSERT_TRUE(strips_are_valid(e.bytes.data(), e.strips.layout));
   std::vector<Triangle> decoded(triangles.size());
   decode_triangles(e.bytes.data(), e.strips.layout, 0, decoded);
@@ -52,7 +52,7 @@ void expect_round_trip(std::span<const Triangle> triangles, uint32_t vertex_coun
 TEST(IndexCodec, GridsRoundTripAndCostLittle) {
   const Mesh grid = test::grid_mesh(8);
   expect_round_trip(grid.triangles, 81);
-  const Encoded e = encode(grid.triangles, 81);
+  const EncodedIndices e = encode(grid.triangles, 81);
   EXPECT_LT(e.strips.layout.total_bits(), 128 * 8u); // one byte per triangle; three u8 indices take three
 }
 
@@ -120,7 +120,7 @@ TEST(IndexCodec, GoldenBytes) {
 
 TEST(IndexCodec, DamagedBitsAreNoticedOrHarmless) {
   const Mesh grid = test::grid_mesh(8);
-  const Encoded e = encode(grid.triangles, 81);
+  const EncodedIndices e = encode(grid.triangles, 81);
   for (uint32_t bit = 0; bit < e.strips.layout.total_bits(); ++bit) {
     std::vector<uint8_t> damaged = e.bytes;
     damaged[bit / 8] ^= static_cast<uint8_t>(1u << (bit % 8));

@@ -18,26 +18,26 @@ namespace packtrace {
 namespace {
 
 using namespace page_fast;
-using Bytes = std::vector<uint8_t>;
+using Octets = std::vector<uint8_t>;
 
-void append_number(Bytes& to, size_t value) {
+void append_number(Octets& to, size_t value) {
   const auto number = static_cast<uint32_t>(value);
   to.insert(to.end(), reinterpret_cast<const uint8_t*>(&number), reinterpret_cast<const uint8_t*>(&number + 1));
 }
 
 /// A page whose parts are not compressed.
-Bytes page_of(const std::array<Bytes, kParts>& parts) {
-  Bytes page;
-  for (const Bytes& part : parts)
+Octets page_of(const std::array<Octets, kParts>& parts) {
+  Octets page;
+  for (const Octets& part : parts)
     for (int i = 0; i < 2; ++i) append_number(page, part.size());
-  for (const Bytes& part : parts) page.insert(page.end(), part.begin(), part.end());
+  for (const Octets& part : parts) page.insert(page.end(), part.begin(), part.end());
   return page;
 }
 
 /// A square of two triangles, encoded by hand.
 struct Square {
   baked::GeometryRecord geometry{};
-  std::array<Bytes, kParts> parts;
+  std::array<Octets, kParts> parts;
   Header header{};
 
   Square() {
@@ -56,10 +56,10 @@ struct Square {
     parts[kResiduals + 2] = {0, 0, 0};
   }
 
-  bool decode(baked::ClusterRecord& record, Bytes& payload) {
+  bool decode(baked::ClusterRecord& record, Octets& payload) {
     parts[kHeaders].resize(kHeaderBytes);
     std::memcpy(parts[kHeaders].data(), &header, kHeaderBytes);
-    const Bytes page = page_of(parts);
+    const Octets page = page_of(parts);
     baked::PageRecord page_record{0, static_cast<uint32_t>(page.size()), 8, 1, static_cast<uint32_t>(PageCodec::kFast)};
     payload.assign(8, 0xcc);
     PageDecoder decoder;
@@ -70,7 +70,7 @@ struct Square {
 TEST(FastPage, APageWrittenByHandIsDecoded) {
   Square square;
   baked::ClusterRecord record;
-  Bytes payload;
+  Octets payload;
   ASSERT_TRUE(square.decode(record, payload));
   EXPECT_EQ(record.anchor, (std::array<int32_t, 3>{5, -2, 7}));
   EXPECT_EQ(record.material_slot, 3u);
@@ -89,7 +89,7 @@ TEST(FastPage, APageWrittenByHandIsDecoded) {
 TEST(FastPage, EveryPartIsNeededAndNoneMayHaveMore) {
   for (uint32_t part = 0; part < kParts; ++part) {
     baked::ClusterRecord record;
-    Bytes payload;
+    Octets payload;
     if (part != kHeaders) {
       Square longer;
       longer.parts[part].push_back(0);
@@ -107,7 +107,7 @@ TEST(FastPage, HeadersOutOfRangeAreRefused) {
     Square square;
     change(square.header);
     baked::ClusterRecord record;
-    Bytes payload;
+    Octets payload;
     return square.decode(record, payload);
   };
   EXPECT_TRUE(decodes([](Header&) {}));
@@ -147,13 +147,13 @@ std::vector<Header> headers_of(const Scene& scene, BakeConfig config = {}) {
     std::memcpy(sizes.data(), page_at, sizeof sizes);
     const std::byte* part = page_at + sizeof sizes + sizes[2 * kFields + 1];
     const uint32_t bytes = sizes[2 * kHeaders], disk_bytes = sizes[2 * kHeaders + 1];
-    Bytes columns(bytes);
+    Octets columns(bytes);
     if (bytes == disk_bytes)
       std::memcpy(columns.data(), part, bytes);
     else
       EXPECT_EQ(ZSTD_decompress(columns.data(), bytes, part, disk_bytes), bytes);
     for (uint32_t c = 0; c < page.cluster_count; ++c) {
-      Bytes row(sizeof(Header));
+      Octets row(sizeof(Header));
       for (size_t k = 0; k < kHeaderBytes; ++k) row[k] = columns[k * page.cluster_count + c];
       std::memcpy(&headers.emplace_back(), row.data(), sizeof(Header));
     }
@@ -229,7 +229,7 @@ TEST(FastPage, KernelsAgreeAndReadWhatWasWritten) {
     const uint32_t count = random.bits() % 256;
     ChannelCode code;
     code.field_count = 1 + random.bits() % 3;
-    std::array<Bytes, 3> bytes;
+    std::array<Octets, 3> bytes;
     uint32_t shift = random.bits() % 3;
     for (uint32_t f = 0; f < code.field_count; ++f) {
       bytes[f].resize(count + kPartSlackBytes);
@@ -252,7 +252,7 @@ TEST(FastPage, KernelsAgreeAndReadWhatWasWritten) {
         expected[i] += static_cast<uint64_t>(value) << field.shift;
       }
     writer.align(1);
-    Bytes low = writer.bytes();
+    Octets low = writer.bytes();
     low.resize(low.size() + kPartSlackBytes);
     code.low = low.data(), code.low_bit = first;
     std::vector<uint64_t> portable(count + kSpareWords), chosen(count + kSpareWords);
@@ -269,7 +269,7 @@ TEST(FastPage, FourNumbersArePackedAsOne) {
     BitWriter writer;
     for (const uint8_t byte : bytes) writer.put(byte & ((1u << width) - 1), width);
     writer.align(8);
-    Bytes padded = writer.bytes();
+    Octets padded = writer.bytes();
     padded.resize(16);
     EXPECT_EQ(pack_four(bytes.data(), width), read_bits(padded.data(), 0, 4 * width)) << width;
   }

@@ -19,7 +19,7 @@ constexpr const char* kPlyText =
     "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 const std::string kTriangles = "Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point P\" [0 0 0  1 0 0  0 1 0]\n";
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 // Outputs and inputs
 
@@ -68,7 +68,7 @@ TEST_F(FilesOfAScene, NoOutputReplacesThem) {
     command.emplace_back("--force");
     const CommandResult result = run_packtrace(command);
     EXPECT_EQ(result.exit_code, 2) << command[0] << " " << command.back() << result.err;
-    EXPECT_TRUE(contains(result.err, "this file is read, so it cannot be the output")) << result.err;
+    EXPECT_TRUE(holds(result.err, "this file is read, so it cannot be the output")) << result.err;
   }
   EXPECT_EQ(read_text(bench_ / "mesh.ply"), kPlyText);
   EXPECT_EQ(read_text(bench_ / "wood.png"), good_png());
@@ -85,7 +85,7 @@ TEST_F(FilesOfAScene, NoErrorReplacesThem) {
       "bake", scene_, "-o", bench_ / "x.ptk", "--strict", "--json", bench_ / "part.json", "--force"};
   const CommandResult result = run_packtrace(command);
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_TRUE(contains(result.err, "part.json: not a JSON file, so the error is not written to it")) << result.err;
+  EXPECT_TRUE(holds(result.err, "part.json: not a JSON file, so the error is not written to it")) << result.err;
   EXPECT_EQ(read_text(bench_ / "part.json"), "Nonsense\n" + kTriangles);
 }
 
@@ -110,7 +110,7 @@ TEST(CompressedScene, EveryVerbReadsIt) {
     const CommandResult result = run_packtrace(command);
     EXPECT_EQ(result.exit_code, 0) << result.err;
   }
-  EXPECT_TRUE(contains(run_packtrace({"info", scene}).out, "triangles 2 "));
+  EXPECT_TRUE(holds(run_packtrace({"info", scene}).out, "triangles 2 "));
 }
 
 TEST(CompressedScene, WhatIsNoSceneIsRefusedAsIfItWereNotCompressed) {
@@ -118,10 +118,10 @@ TEST(CompressedScene, WhatIsNoSceneIsRefusedAsIfItWereNotCompressed) {
   write_text(bench / "zeros.gz", gzip(std::string(1 << 20, '\0')));
   const CommandResult zeros = run_packtrace({"bake", bench / "zeros.gz", "-o", bench / "x.ptk"});
   EXPECT_EQ(zeros.exit_code, 3);
-  EXPECT_TRUE(contains(zeros.err, "not a text file, so not a pbrt-v3 scene")) << zeros.err;
+  EXPECT_TRUE(holds(zeros.err, "not a text file, so not a pbrt-v3 scene")) << zeros.err;
   write_text(bench / "cut.gz", without_end(gzip("WorldBegin\n" + kTriangles + "WorldEnd\n"), 9));
   const CommandResult cut = run_packtrace({"info", bench / "cut.gz"});
-  EXPECT_TRUE(contains(cut.err, "truncated gzip data; the rest of the file is skipped")) << cut.err;
+  EXPECT_TRUE(holds(cut.err, "truncated gzip data; the rest of the file is skipped")) << cut.err;
 }
 
 // Mesh files
@@ -133,9 +133,9 @@ TEST(MeshFilesAsScenes, EveryVerbReadsThem) {
   write_text(ply, kPlyText);
   const CommandResult bake = run_packtrace({"bake", obj, ply, "-o", baked, "--up", "z", "--scale", "2", "--json", "-"});
   ASSERT_EQ(bake.exit_code, 0) << bake.err;
-  EXPECT_TRUE(contains(bake.out, "\"inputs\"")) << bake.out;
-  EXPECT_TRUE(contains(run_packtrace({"info", baked}).out, "triangles 2 stored"));
-  EXPECT_TRUE(contains(run_packtrace({"info", obj, "--scale", "3"}).out, "bounds 3 x 3 x 0"));
+  EXPECT_TRUE(holds(bake.out, "\"inputs\"")) << bake.out;
+  EXPECT_TRUE(holds(run_packtrace({"info", baked}).out, "triangles 2 stored"));
+  EXPECT_TRUE(holds(run_packtrace({"info", obj, "--scale", "3"}).out, "bounds 3 x 3 x 0"));
   const CommandResult render = run_packtrace({"render", obj, "-o", bench / "x.png", "--frames", "1", "--size", "8x8"});
   EXPECT_EQ(render.exit_code, 0) << render.err;
   ASSERT_EQ(run_packtrace({"bake", obj, "-o", bench / "one.ptk", "--scale", "2"}).exit_code, 0);
@@ -158,11 +158,11 @@ TEST(MeshFilesAsScenes, OptionsWithoutUseAreRefused) {
            {{"bake", obj, obj, "-o", bench / "x.ptk", "--target", "size=1MB"}, "--target measures one file"}}) {
     const CommandResult result = run_packtrace(command);
     EXPECT_EQ(result.exit_code, 2) << result.err;
-    EXPECT_TRUE(contains(result.err, problem)) << result.err;
+    EXPECT_TRUE(holds(result.err, problem)) << result.err;
   }
   const CommandResult missing = run_packtrace({"bake", bench / "none.obj", "-o", bench / "x.ptk"});
   EXPECT_EQ(missing.exit_code, 3);
-  EXPECT_TRUE(contains(missing.err, "none.obj: ")) << missing.err;
+  EXPECT_TRUE(holds(missing.err, "none.obj: ")) << missing.err;
 }
 
 // Names
@@ -188,8 +188,8 @@ TEST(NamesOfAScene, NeedNotBeUtf8) {
     EXPECT_FALSE(nlohmann::json::parse(result.out, nullptr, false).is_discarded()) << command[0] << result.out;
   }
   const std::string glb = read_text(bench / "\xe9.glb");
-  EXPECT_TRUE(contains(glb, "b\u00e4um"));
-  EXPECT_TRUE(contains(glb, "\u00fc.exr"));
+  EXPECT_TRUE(holds(glb, "b\u00e4um"));
+  EXPECT_TRUE(holds(glb, "\u00fc.exr"));
 }
 
 TEST(NamesOfAScene, DoNotReachTheTerminalAsControlCharacters) {
@@ -207,8 +207,8 @@ TEST(NamesOfAScene, DoNotReachTheTerminalAsControlCharacters) {
   };
   for (const std::vector<std::string>& command : commands) {
     const CommandResult result = run_packtrace(command);
-    for (const char* const raw : {"\x1b", "\u202e"}) EXPECT_FALSE(contains(result.out + result.err, raw)) << command[0];
-    EXPECT_TRUE(contains(result.out + result.err, "\\xe2\\x80\\xae")) << command[0] << result.out << result.err;
+    for (const char* const raw : {"\x1b", "\u202e"}) EXPECT_FALSE(holds(result.out + result.err, raw)) << command[0];
+    EXPECT_TRUE(holds(result.out + result.err, "\\xe2\\x80\\xae")) << command[0] << result.out << result.err;
   }
 }
 
@@ -230,7 +230,7 @@ TEST(CameraOfAScene, IsLeftOutBehindAnIgnoredTransformAndTheEndSaysSo) {
        std::vector<std::vector<std::string>>{{"info", scene}, {"bake", scene, "-o", baked}}) {
     const CommandResult result = run_packtrace(command);
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_TRUE(contains(result.out, line)) << result.out;
+    EXPECT_TRUE(holds(result.out, line)) << result.out;
   }
   const nlohmann::json info = nlohmann::json::parse(run_packtrace({"info", scene, "--json", "-"}).out, nullptr, false);
   EXPECT_EQ(info["cameras_left_out"], 1);
@@ -238,7 +238,7 @@ TEST(CameraOfAScene, IsLeftOutBehindAnIgnoredTransformAndTheEndSaysSo) {
   for (const std::string& input : {scene, baked}) {
     const CommandResult result =
         run_packtrace({"render", input, "-o", bench / "x.png", "--force", "--frames", "1", "--json", "-"});
-    EXPECT_TRUE(contains(result.err, "no camera; showing the whole scene")) << result.err;
+    EXPECT_TRUE(holds(result.err, "no camera; showing the whole scene")) << result.err;
     const nlohmann::json report = nlohmann::json::parse(result.out, nullptr, false);
     EXPECT_EQ(report["camera"],
               (nlohmann::json{{"index", nullptr}, {"frames_scene", true}, {"reason", "the scene has no camera"}}));
@@ -259,8 +259,8 @@ TEST(CameraOfAScene, ThatSeesNothingGivesWayToOneThatFramesTheScene) {
     const CommandResult result = run_packtrace(command);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_TRUE(
-        contains(result.err,
-                 "warning: camera 0 sees nothing of the scene; showing the whole scene (--camera 0 keeps the camera)"))
+        holds(result.err,
+              "warning: camera 0 sees nothing of the scene; showing the whole scene (--camera 0 keeps the camera)"))
         << result.err;
     const nlohmann::json report = nlohmann::json::parse(result.out, nullptr, false);
     EXPECT_EQ(report["camera"],
@@ -289,12 +289,12 @@ TEST(CameraOfAScene, IsReplacedInSequencesToo) {
     };
     const CommandResult result = render("own", {});
     EXPECT_EQ(result.exit_code, 0);
-    EXPECT_TRUE(contains(result.err, "warning: camera 0 sees nothing of the scene; showing the whole scene"))
+    EXPECT_TRUE(holds(result.err, "warning: camera 0 sees nothing of the scene; showing the whole scene"))
         << result.err;
     const CommandResult framed = render("auto", {"--camera", "auto", "--size", "32x24"});
-    EXPECT_FALSE(contains(framed.err, "warning")) << framed.err;
+    EXPECT_FALSE(holds(framed.err, "warning")) << framed.err;
     const CommandResult kept = render("kept", {"--camera", "0"});
-    EXPECT_FALSE(contains(kept.err, "warning")) << kept.err;
+    EXPECT_FALSE(holds(kept.err, "warning")) << kept.err;
     for (const char* const number : {"0.png", "1.png"}) {
       const std::string own = read_text(bench / (std::string("own") + number));
       EXPECT_EQ(own, read_text(bench / (std::string("auto") + number)));
@@ -308,7 +308,7 @@ TEST(CameraOfAScene, ThatWasAskedForStays) {
   write_text(bench / "scene.pbrt", ball_scene(kAway));
   const CommandResult result = run_packtrace(
       {"render", bench / "scene.pbrt", "-o", bench / "x.png", "--camera", "0", "--frames", "1", "--json", "-"});
-  EXPECT_TRUE(contains(result.err, "this camera sees nothing of the scene; try --camera auto")) << result.err;
+  EXPECT_TRUE(holds(result.err, "this camera sees nothing of the scene; try --camera auto")) << result.err;
   const nlohmann::json report = nlohmann::json::parse(result.out, nullptr, false);
   EXPECT_EQ(report["camera"], (nlohmann::json{{"index", 0}, {"frames_scene", false}, {"reason", nullptr}}));
   EXPECT_EQ(report["hit_pixels"], 0);

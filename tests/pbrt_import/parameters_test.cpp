@@ -20,7 +20,7 @@ void add(ParameterList& list, Parameter parameter) {
   list.keep();
 }
 
-std::string numbered(int number) { return std::string("p").append(std::to_string(number)); }
+std::string parameter_name(int number) { return std::string("p").append(std::to_string(number)); }
 
 TEST(Parameters, SynonymsAreTheSameType) {
   EXPECT_EQ(parameter_type("color"), parameter_type("rgb"));
@@ -39,8 +39,8 @@ TEST(Parameters, LastOfTheSameNameAndTypeWins) {
 
 TEST(Parameters, LastWinsInVeryLongListsToo) {
   ParameterList list;
-  for (int i = 0; i < 100; ++i) add(list, number(numbered(i % 50), {static_cast<float>(i)}));
-  for (int i = 0; i < 50; ++i) EXPECT_EQ(list.get_float(numbered(i), -1), static_cast<float>(50 + i));
+  for (int i = 0; i < 100; ++i) add(list, number(parameter_name(i % 50), {static_cast<float>(i)}));
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(list.get_float(parameter_name(i), -1), static_cast<float>(50 + i));
 }
 
 TEST(Parameters, WrongCountGivesTheDefaultAndStaysUnused) {

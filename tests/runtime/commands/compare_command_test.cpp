@@ -19,20 +19,20 @@ namespace {
 
 constexpr ImageSize kSize{24, 16};
 
-struct Outcome {
+struct Comparison {
   int code = -1;
   std::string out, err;
   nlohmann::json json() const { return nlohmann::json::parse(out); }
 };
 
-Outcome compare(std::vector<std::string> arguments) {
+Comparison compare(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {"packtrace", "compare"});
   std::vector<const char*> argv;
   for (const std::string& argument : arguments) argv.push_back(argument.c_str());
   CLI::App app("test");
   GlobalOptions globals;
   add_compare_command(app, globals);
-  Outcome result;
+  Comparison result;
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
   result.code = run_verbs(app, globals, static_cast<int>(argv.size()), argv.data());
@@ -52,8 +52,8 @@ std::string write_ao(const std::filesystem::path& path, const std::vector<float>
 TEST(CompareCommand, EqualImagesPassEveryLimit) {
   const TemporaryFolder folder;
   const std::string a = write_ao(folder / "a.exr", noise_image(kSize, 1, 1).data);
-  const Outcome result = compare({a, a, "--json", "-", "--max-rmse", "0", "--max-mae", "0", "--min-psnr", "100",
-                                  "--min-ssim", "1", "--max-flip", "0", "--max-mismatch", "0"});
+  const Comparison result = compare({a, a, "--json", "-", "--max-rmse", "0", "--max-mae", "0", "--min-psnr", "100",
+                                     "--min-ssim", "1", "--max-flip", "0", "--max-mismatch", "0"});
   EXPECT_EQ(result.code, 0) << result.err;
   const nlohmann::json json = result.json();
   EXPECT_EQ(json["identical"], true);
@@ -75,7 +75,7 @@ TEST(CompareCommand, EachLimitCanFail) {
                                            {"--min-ssim", "0.92", "0.93"},
                                            {"--max-flip", "0.7", "0.1"}}) {
     EXPECT_EQ(compare({a, b, option, pass}).code, 0) << option;
-    const Outcome failed = compare({a, b, option, fail, "--json", "-"});
+    const Comparison failed = compare({a, b, option, fail, "--json", "-"});
     EXPECT_EQ(failed.code, 5) << option;
     EXPECT_EQ(failed.json()["passed"], false);
     EXPECT_NE(failed.err.find("beyond the limit"), std::string::npos) << failed.err;
@@ -88,7 +88,7 @@ TEST(CompareCommand, MissesAreLeftOutAndMismatchesReported) {
   a[0] = b[0] = kInvalidAo; // no value in either image
   b[1] = kInvalidAo;        // no value in one image
   const std::string file_a = write_ao(folder / "a.exr", a), file_b = write_ao(folder / "b.exr", b);
-  const Outcome result = compare({file_a, file_b, "--json", "-"});
+  const Comparison result = compare({file_a, file_b, "--json", "-"});
   EXPECT_EQ(result.code, 0);
   const nlohmann::json json = result.json();
   EXPECT_EQ(json["compared_pixels"], kSize.pixels() - 2);
@@ -112,7 +112,7 @@ TEST(CompareCommand, PngAndExrOfTheSameAoAgree) {
   ao.data[7] = kInvalidAo;
   const std::string exr = write_ao(folder / "a.exr", ao.data);
   for (const std::string& picture : {png, rgb}) {
-    const Outcome result = compare({picture, exr, "--json", "-", "--max-mae", "0.004"});
+    const Comparison result = compare({picture, exr, "--json", "-", "--max-mae", "0.004"});
     EXPECT_EQ(result.code, 0) << result.err;
     EXPECT_EQ(result.json()["compared_pixels"], kSize.pixels() - 1);
     EXPECT_EQ(result.json()["mismatched_pixels"], 0u);
@@ -125,7 +125,7 @@ TEST(CompareCommand, AlphaIsIgnored) {
   write_png(folder / "a.png", a, PngTransfer::kSrgb);
   for (size_t i = 3; i < a.data.size(); i += 4) a.data[i] = 0.0f;
   write_png(folder / "b.png", a, PngTransfer::kSrgb);
-  const Outcome result = compare({folder / "a.png", folder / "b.png", "-v", "--max-rmse", "0"});
+  const Comparison result = compare({folder / "a.png", folder / "b.png", "-v", "--max-rmse", "0"});
   EXPECT_EQ(result.code, 0);
   EXPECT_NE(result.err.find("alpha"), std::string::npos);
 }
@@ -152,7 +152,7 @@ TEST(CompareCommand, SmallImagesSkipSsimUnlessItIsAskedFor) {
   const TemporaryFolder folder;
   const std::string a = folder / "a.png";
   write_png(a, Image({4, 4}, 1, 0.5f), PngTransfer::kSrgb);
-  const Outcome all = compare({a, a, "--json", "-"});
+  const Comparison all = compare({a, a, "--json", "-"});
   EXPECT_EQ(all.code, 0);
   EXPECT_FALSE(all.json()["metrics"].contains("ssim"));
   EXPECT_TRUE(all.json()["metrics"].contains("flip"));
@@ -189,7 +189,7 @@ TEST(CompareCommand, TextIsForPeopleAndQuietIsQuiet) {
   const TemporaryFolder folder;
   const std::string a = write_ao(folder / "a.exr", noise_image(kSize, 1, 1).data);
   EXPECT_NE(compare({a, a, "--max-rmse", "1"}).out.find("limit rmse 1: ok"), std::string::npos);
-  const Outcome quiet = compare({a, a, "-q"});
+  const Comparison quiet = compare({a, a, "-q"});
   EXPECT_EQ(quiet.out + quiet.err, "");
 }
 

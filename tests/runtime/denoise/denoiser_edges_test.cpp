@@ -11,7 +11,7 @@ namespace {
 
 using namespace synthetic;
 
-constexpr ImageSize kSize{64, 512};
+constexpr ImageSize kEdgeSize{64, 512};
 constexpr uint32_t kEdge = 32; ///< first column of the right side
 
 /// Denoises an image with noise left of kEdge and AO 1 to its right. Returns the largest error on the right side. The
@@ -21,24 +21,24 @@ float worst_leak(const GBuffer& g, uint32_t frames) {
   float worst = 0;
   for (uint32_t f = 0; f < frames; ++f) {
     const AoFrame frame =
-        samples(kSize, [&](uint32_t x, uint32_t y) { return x < kEdge ? noisy(0.5f, x, y, f) : 1.0f; });
+        samples(kEdgeSize, [&](uint32_t x, uint32_t y) { return x < kEdge ? noisy(0.5f, x, y, f) : 1.0f; });
     const DenoisedAo& result = denoiser.next_frame(g, frame);
-    for (uint32_t y = 0; y < kSize.height; ++y)
-      for (uint32_t x = kEdge; x < kSize.width; ++x)
-        worst = std::max(worst, 1.0f - result.ao[static_cast<size_t>(y) * kSize.width + x]);
+    for (uint32_t y = 0; y < kEdgeSize.height; ++y)
+      for (uint32_t x = kEdge; x < kEdgeSize.width; ++x)
+        worst = std::max(worst, 1.0f - result.ao[static_cast<size_t>(y) * kEdgeSize.width + x]);
   }
   return worst;
 }
 
 GBuffer walls(const std::function<void(GBuffer&, size_t i, uint32_t x)>& change) {
-  GBuffer g = wall(kSize);
-  for (uint32_t y = 0; y < kSize.height; ++y)
-    for (uint32_t x = 0; x < kSize.width; ++x) change(g, static_cast<size_t>(y) * kSize.width + x, x);
+  GBuffer g = wall(kEdgeSize);
+  for (uint32_t y = 0; y < kEdgeSize.height; ++y)
+    for (uint32_t x = 0; x < kEdgeSize.width; ++x) change(g, static_cast<size_t>(y) * kEdgeSize.width + x, x);
   return g;
 }
 
 TEST(DenoiserEdges, WithoutAnEdgeInTheGuidesNoiseDoesSpread) { // shows that the tests below can fail
-  EXPECT_GT(worst_leak(wall(kSize), 1), 0.05f);
+  EXPECT_GT(worst_leak(wall(kEdgeSize), 1), 0.05f);
 }
 
 TEST(DenoiserEdges, DepthStepOfATenthDoesNotLeak) {
@@ -76,22 +76,23 @@ TEST(DenoiserEdges, MissesDoNotLeak) {
   const GBuffer g = walls([](GBuffer& b, size_t i, uint32_t x) {
     if (x < kEdge) b.view_z[i] = 0.0f, b.normal[i] = Vec3(0), b.instance[i] = kNoInstance;
   });
-  const AoFrame frame = samples(kSize, [](uint32_t x, uint32_t) { return x < kEdge ? kInvalidAo : 0.8f; });
+  const AoFrame frame = samples(kEdgeSize, [](uint32_t x, uint32_t) { return x < kEdge ? kInvalidAo : 0.8f; });
   const DenoisedAo& result = denoiser.next_frame(g, frame);
-  for (size_t i = 0; i < kSize.pixels(); ++i) ASSERT_EQ(result.ao[i], i % kSize.width < kEdge ? kInvalidAo : 0.8f);
+  for (size_t i = 0; i < kEdgeSize.pixels(); ++i)
+    ASSERT_EQ(result.ao[i], i % kEdgeSize.width < kEdge ? kInvalidAo : 0.8f);
 }
 
 TEST(DenoiserEdges, TiltedPlanesBlurLikeFlatOnes) {
   const auto rmse = [](const GBuffer& g) {
     AoDenoiser denoiser;
-    return rmse_of(denoiser.next_frame(g, noise(kSize, 0.5f, 3)).ao, kSize, all(kSize),
+    return rmse_of(denoiser.next_frame(g, noise(kEdgeSize, 0.5f, 3)).ao, kEdgeSize, all(kEdgeSize),
                    [](uint32_t, uint32_t) { return expected(0.5f); });
   };
   const double tilted = rmse(walls([](GBuffer& g, size_t i, uint32_t x) {
     g.view_z[i] = 1.0f / (0.05f + 0.004f * static_cast<float>(x)); // the right end is five times nearer
     g.normal[i] = glm::normalize(Vec3(1, 0, -0.2f));
   }));
-  EXPECT_LE(tilted, 1.1 * rmse(wall(kSize)));
+  EXPECT_LE(tilted, 1.1 * rmse(wall(kEdgeSize)));
 }
 
 TEST(DenoiserEdges, CurvedSurfacesBlurLikeFlatOnes) {
@@ -99,14 +100,14 @@ TEST(DenoiserEdges, CurvedSurfacesBlurLikeFlatOnes) {
     DenoiserConfig config;
     config.set(setting);
     AoDenoiser denoiser(config);
-    return rmse_of(denoiser.next_frame(g, noise(kSize, 0.5f, 3)).ao, kSize, all(kSize),
+    return rmse_of(denoiser.next_frame(g, noise(kEdgeSize, 0.5f, 3)).ao, kEdgeSize, all(kEdgeSize),
                    [](uint32_t, uint32_t) { return expected(0.5f); });
   };
   const GBuffer curved = walls([](GBuffer& g, size_t i, uint32_t x) {
     const float from_middle = static_cast<float>(x) - 31.5f;
     g.view_z[i] = 1.0f / (0.1f + 2e-5f * from_middle * from_middle); // 4 pixels away it leaves the plane by 0.3 %
   });
-  const double flat = rmse(wall(kSize), "guide_bend=1.4");
+  const double flat = rmse(wall(kEdgeSize), "guide_bend=1.4");
   EXPECT_LE(rmse(curved, "guide_bend=1.4"), 1.1 * flat);
   EXPECT_GT(rmse(curved, "guide_bend=0"), 1.2 * flat);
 }
@@ -116,10 +117,11 @@ TEST(DenoiserEdges, ContactShadowsOnOneSurfaceStaySharpOnceSampled) {
   const float left = 0.9f, right = 0.1f;
   const DenoisedAo* result = nullptr;
   for (uint32_t f = 0; f < 64; ++f)
-    result = &denoiser.next_frame(
-        wall(kSize), samples(kSize, [&](uint32_t x, uint32_t y) { return noisy(x < kEdge ? left : right, x, y, f); }));
-  EXPECT_NEAR(mean_of(result->ao, kSize, {kEdge - 1, 0, kEdge, kSize.height}), expected(left), 0.01);
-  EXPECT_NEAR(mean_of(result->ao, kSize, {kEdge, 0, kEdge + 1, kSize.height}), expected(right), 0.01);
+    result = &denoiser.next_frame(wall(kEdgeSize), samples(kEdgeSize, [&](uint32_t x, uint32_t y) {
+                                    return noisy(x < kEdge ? left : right, x, y, f);
+                                  }));
+  EXPECT_NEAR(mean_of(result->ao, kEdgeSize, {kEdge - 1, 0, kEdge, kEdgeSize.height}), expected(left), 0.01);
+  EXPECT_NEAR(mean_of(result->ao, kEdgeSize, {kEdge, 0, kEdge + 1, kEdgeSize.height}), expected(right), 0.01);
 }
 
 /// Every pixel shows another leaf.

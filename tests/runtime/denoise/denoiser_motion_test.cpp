@@ -14,7 +14,7 @@ namespace {
 
 using namespace synthetic;
 
-constexpr ImageSize kSize{160, 96};
+constexpr ImageSize kMotionSize{160, 96};
 const uint32_t kMovingFrames = FluxConfig{}.max_tspp_moving + 1; ///< longest history of moving pixels, with this frame
 
 TEST(Reprojection, IntegerPansFetchTheSameBits) {
@@ -49,10 +49,10 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
 /// Denoises two frames with a change of the guides in between. Returns whether the pixels keep their history.
 bool keeps_history(const std::function<void(GBuffer&, size_t)>& change) {
   AoDenoiser denoiser;
-  GBuffer g = wall(kSize);
-  denoiser.next_frame(g, noise(kSize, 0.5f, 0));
-  for (size_t i = 0; i < kSize.pixels(); ++i) change(g, i);
-  return denoiser.next_frame(g, noise(kSize, 0.5f, 1)).tspp[kSize.pixels() / 2 + 80] > 1.5f;
+  GBuffer g = wall(kMotionSize);
+  denoiser.next_frame(g, noise(kMotionSize, 0.5f, 0));
+  for (size_t i = 0; i < kMotionSize.pixels(); ++i) change(g, i);
+  return denoiser.next_frame(g, noise(kMotionSize, 0.5f, 1)).tspp[kMotionSize.pixels() / 2 + 80] > 1.5f;
 }
 
 TEST(Reprojection, AnotherDepthNormalOrInstanceIsAnotherSurface) {
@@ -67,7 +67,7 @@ TEST(Reprojection, AnotherDepthNormalOrInstanceIsAnotherSurface) {
 TEST(Reprojection, ComparesDepthWhereTheSurfaceWas) {
   const auto from = [](float z_before) {
     return [=](GBuffer& g, size_t i) {
-      g.previous_z.resize(kSize.pixels());
+      g.previous_z.resize(kMotionSize.pixels());
       g.view_z[i] *= 1.1f, g.previous_z[i] = z_before;
     };
   };
@@ -83,14 +83,14 @@ TEST(AoDenoiser, SurfacesThatComeNearerKeepTheirHistory) {
   AoDenoiser denoiser;
   float z = 50.0f;
   for (uint32_t f = 0; f < 20; ++f) {
-    GBuffer g = wall(kSize, z); // the centre of the image grows by 10 % a frame: motion away from it
-    g.previous_z.assign(kSize.pixels(), f == 0 ? z : z / 0.9f);
-    for (uint32_t y = 0; y < kSize.height; ++y)
-      for (uint32_t x = 0; x < kSize.width; ++x)
-        g.motion_px[y * kSize.width + x] =
+    GBuffer g = wall(kMotionSize, z); // the centre of the image grows by 10 % a frame: motion away from it
+    g.previous_z.assign(kMotionSize.pixels(), f == 0 ? z : z / 0.9f);
+    for (uint32_t y = 0; y < kMotionSize.height; ++y)
+      for (uint32_t x = 0; x < kMotionSize.width; ++x)
+        g.motion_px[y * kMotionSize.width + x] =
             0.1f * Vec2(static_cast<float>(x) + 0.5f - 80.0f, static_cast<float>(y) + 0.5f - 48.0f);
-    const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, 0.5f, f));
-    EXPECT_GT(mean_of(result.tspp, kSize, {20, 20, 140, 76}), 0.9 * std::min(f + 1, kMovingFrames));
+    const DenoisedAo& result = denoiser.next_frame(g, noise(kMotionSize, 0.5f, f));
+    EXPECT_GT(mean_of(result.tspp, kMotionSize, {20, 20, 140, 76}), 0.9 * std::min(f + 1, kMovingFrames));
     z *= 0.9f;
   }
 }
@@ -100,28 +100,29 @@ TEST(AoDenoiser, MovingInstancesKeepHistoryAndWhatTheyUncoverHasNone) {
   config.ours.reprojection_nearby = 0.0f;
   AoDenoiser denoiser(config), nearby;
   for (uint32_t f = 0; f < 24; ++f) { // a card that moves right by 3 pixels and nearer by 5 % a frame
-    GBuffer g = wall(kSize);
+    GBuffer g = wall(kMotionSize);
     g.previous_z = g.view_z;
     const auto z_at = [](uint32_t frame) { return 8.0f * std::pow(0.95f, static_cast<float>(frame)); };
-    for (uint32_t i = 0; i < kSize.pixels(); ++i) {
-      const uint32_t x = i % kSize.width, y = i / kSize.width, left = 20 + 3 * f;
+    for (uint32_t i = 0; i < kMotionSize.pixels(); ++i) {
+      const uint32_t x = i % kMotionSize.width, y = i / kMotionSize.width, left = 20 + 3 * f;
       if (x < left || x >= left + 30 || y < 20 || y >= 76) continue;
       g.view_z[i] = z_at(f), g.previous_z[i] = f == 0 ? z_at(f) : z_at(f - 1);
       g.instance[i] = 1;
       if (f > 0) g.motion_px[i] = Vec2(3, 0);
     }
-    const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, 0.5f, f));
-    const DenoisedAo& begun = nearby.next_frame(g, noise(kSize, 0.5f, f));
+    const DenoisedAo& result = denoiser.next_frame(g, noise(kMotionSize, 0.5f, f));
+    const DenoisedAo& begun = nearby.next_frame(g, noise(kMotionSize, 0.5f, f));
     if (f == 0) continue;
     const uint32_t left = 20 + 3 * f;
     const float length = static_cast<float>(f + 1), moving = static_cast<float>(std::min(f + 1, kMovingFrames));
-    EXPECT_GT(mean_of(result.tspp, kSize, {left + 3, 24, left + 27, 72}), 0.8f * moving) << "on the card, frame " << f;
-    EXPECT_EQ(mean_of(result.tspp, kSize, {left - 3, 20, left, 76}), 1.0) << "uncovered, frame " << f;
-    const double next_to_wall = mean_of(begun.tspp, kSize, {left - 3, 24, left - 2, 72});
+    EXPECT_GT(mean_of(result.tspp, kMotionSize, {left + 3, 24, left + 27, 72}), 0.8f * moving)
+        << "on the card, frame " << f;
+    EXPECT_EQ(mean_of(result.tspp, kMotionSize, {left - 3, 20, left, 76}), 1.0) << "uncovered, frame " << f;
+    const double next_to_wall = mean_of(begun.tspp, kMotionSize, {left - 3, 24, left - 2, 72});
     EXPECT_GT(next_to_wall, 1.3) << "frame " << f;
     EXPECT_LE(next_to_wall, 1.0 + 0.36 * config.ours.max_tspp_moving) << "frame " << f;
-    EXPECT_EQ(mean_of(begun.tspp, kSize, {left - 1, 24, left, 72}), 1.0) << "too far from the wall, frame " << f;
-    EXPECT_GT(mean_of(result.tspp, kSize, {0, 80, kSize.width, 96}), 0.8f * length) << "still, frame " << f;
+    EXPECT_EQ(mean_of(begun.tspp, kMotionSize, {left - 1, 24, left, 72}), 1.0) << "too far from the wall, frame " << f;
+    EXPECT_GT(mean_of(result.tspp, kMotionSize, {0, 80, kMotionSize.width, 96}), 0.8f * length) << "still, frame " << f;
   }
 }
 
@@ -164,11 +165,12 @@ double psnr_of_pan(Vec2 pan) {
     const auto p = [&](uint32_t x, uint32_t y) {
       return p_at(static_cast<float>(x) - shift.x, static_cast<float>(y) - shift.y);
     };
-    GBuffer g = wall(kSize);
+    GBuffer g = wall(kMotionSize);
     for (Vec2& motion : g.motion_px) motion = f == 0 ? Vec2(0) : pan;
     const DenoisedAo& result =
-        denoiser.next_frame(g, samples(kSize, [&](uint32_t x, uint32_t y) { return noisy(p(x, y), x, y, f); }));
-    rmse = rmse_of(result.ao, kSize, {40, 40, 120, 56}, [&](uint32_t x, uint32_t y) { return expected(p(x, y)); });
+        denoiser.next_frame(g, samples(kMotionSize, [&](uint32_t x, uint32_t y) { return noisy(p(x, y), x, y, f); }));
+    rmse =
+        rmse_of(result.ao, kMotionSize, {40, 40, 120, 56}, [&](uint32_t x, uint32_t y) { return expected(p(x, y)); });
   }
   return -20.0 * std::log10(rmse);
 }
@@ -189,22 +191,22 @@ TEST(AoDenoiser, DisoccludedSurfacesCatchUpInTwelveFrames) {
   };
   AoDenoiser denoiser;
   for (uint32_t f = 0; f < 52; ++f) {
-    GBuffer g = wall(kSize);
-    for (uint32_t i = 0; i < kSize.pixels(); ++i) {
-      if (!covered(f, i % kSize.width, i / kSize.width)) continue;
+    GBuffer g = wall(kMotionSize);
+    for (uint32_t i = 0; i < kMotionSize.pixels(); ++i) {
+      if (!covered(f, i % kMotionSize.width, i / kMotionSize.width)) continue;
       g.view_z[i] = 5.0f, g.instance[i] = 1;
       if (f == 40) g.motion_px[i] = Vec2(16, 0);
     }
-    const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, p, f));
+    const DenoisedAo& result = denoiser.next_frame(g, noise(kMotionSize, p, f));
     if (f == 40) {
-      EXPECT_EQ(result.tspp[48 * kSize.width + 48], 1.0f);                              // disoccluded
-      EXPECT_EQ(result.tspp[48 * kSize.width + 75], static_cast<float>(kMovingFrames)); // on the card
+      EXPECT_EQ(result.tspp[48 * kMotionSize.width + 48], 1.0f);                              // disoccluded
+      EXPECT_EQ(result.tspp[48 * kMotionSize.width + 75], static_cast<float>(kMovingFrames)); // on the card
     }
     for (float ao : result.ao) ASSERT_TRUE(ao >= 0.0f && ao <= 1.0f);
     if (f != 51) continue;
     const auto truth = [&](uint32_t, uint32_t) { return expected(p); };
-    EXPECT_LE(rmse_of(result.ao, kSize, {40, 20, 56, 76}, truth),
-              1.5 * rmse_of(result.ao, kSize, {104, 0, 160, 96}, truth));
+    EXPECT_LE(rmse_of(result.ao, kMotionSize, {40, 20, 56, 76}, truth),
+              1.5 * rmse_of(result.ao, kMotionSize, {104, 0, 160, 96}, truth));
   }
 }
 
@@ -213,12 +215,12 @@ std::array<double, 4> ghost(float before, float after, Rect changed, const Denoi
   AoDenoiser denoiser(config);
   std::array<double, 4> left{};
   for (uint32_t f = 0; f < 96 + 32; ++f) {
-    const AoFrame frame = samples(kSize, [&](uint32_t x, uint32_t y) {
+    const AoFrame frame = samples(kMotionSize, [&](uint32_t x, uint32_t y) {
       const bool inside = x >= changed.x0 && x < changed.x1 && y >= changed.y0 && y < changed.y1;
       return noisy(inside && f < 96 ? before : after, x, y, f);
     });
-    const DenoisedAo& result = denoiser.next_frame(wall(kSize), frame);
-    const double residual = std::abs(mean_of(result.ao, kSize, changed) - static_cast<double>(expected(after))) /
+    const DenoisedAo& result = denoiser.next_frame(wall(kMotionSize), frame);
+    const double residual = std::abs(mean_of(result.ao, kMotionSize, changed) - static_cast<double>(expected(after))) /
                             std::abs(static_cast<double>(expected(before) - expected(after)));
     const uint32_t frames = f + 1 - std::min(f + 1, 96u);
     for (size_t i = 0; i < 4; ++i)

@@ -19,7 +19,7 @@ namespace {
 
 using namespace synthetic;
 
-constexpr ImageSize kSize{67, 45};
+constexpr ImageSize kOddSize{67, 45};
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
 
 void expect_sound(const DenoisedAo& result) {
@@ -40,19 +40,19 @@ TEST(AoDenoiser, OneDamagedTexelStaysOneTexelAndHealsInTwoFrames) {
       [](GBuffer& g, AoFrame&, size_t i, float v) { g.position[i].x = v; },
       [](GBuffer& g, AoFrame&, size_t i, float v) { g.motion_px[i].x = v; },
   };
-  const size_t damaged = 20 * kSize.width + 30;
+  const size_t damaged = 20 * kOddSize.width + 30;
   for (size_t kind = 0; kind < damages.size(); ++kind)
     for (float value : {kNan, kInfinity, -kInfinity, -1e30f, 3e38f, 1e-42f}) {
       SCOPED_TRACE(testing::Message() << "array " << kind << " value " << value);
       AoDenoiser clean, hurt;
       for (uint32_t f = 0; f < 12; ++f) {
-        GBuffer g = wall(kSize);
-        AoFrame frame = noise(kSize, 0.4f, f);
+        GBuffer g = wall(kOddSize);
+        AoFrame frame = noise(kOddSize, 0.4f, f);
         const DenoisedAo expected = clean.next_frame(g, frame);
         if (f == 8) damages[kind](g, frame, damaged, value);
         const DenoisedAo& result = hurt.next_frame(g, frame);
         expect_sound(result);
-        for (size_t i = 0; i < kSize.pixels(); ++i) {
+        for (size_t i = 0; i < kOddSize.pixels(); ++i) {
           if (i != damaged) {
             ASSERT_NEAR(result.ao[i], expected.ao[i], 0.05f) << "frame " << f;
             ASSERT_GE(result.tspp[i], expected.tspp[i] - 2.0f) << "frame " << f;
@@ -72,9 +72,9 @@ TEST(AoDenoiser, GarbageEverywhereGivesSoundImages) {
   };
   AoDenoiser denoiser;
   for (uint32_t f = 0; f < 40; ++f) {
-    GBuffer g = wall(kSize);
-    AoFrame frame = noise(kSize, 0.5f, f);
-    for (uint32_t i = 0; i < kSize.pixels(); ++i) {
+    GBuffer g = wall(kOddSize);
+    AoFrame frame = noise(kOddSize, 0.5f, f);
+    for (uint32_t i = 0; i < kOddSize.pixels(); ++i) {
       g.view_z[i] = pick(i, 0, f), g.normal[i] = Vec3(pick(i, 1, f), pick(i, 2, f), pick(i, 3, f));
       g.motion_px[i] = Vec2(pick(i, 4, f), pick(i, 5, f)),
       g.instance[i] = static_cast<uint32_t>(7.0f * uniform(i, 6, f));
@@ -82,7 +82,7 @@ TEST(AoDenoiser, GarbageEverywhereGivesSoundImages) {
     }
     const DenoisedAo& result = denoiser.next_frame(g, frame);
     expect_sound(result);
-    for (size_t i = 0; i < kSize.pixels(); ++i)
+    for (size_t i = 0; i < kOddSize.pixels(); ++i)
       if (!(g.view_z[i] > 0.0f)) {
         ASSERT_EQ(result.ao[i], kInvalidAo);
       }
@@ -151,13 +151,13 @@ TEST(AoDenoiser, CheckerboardsAreFilledAtOnceAndStayClose) {
 }
 
 TEST(AoDenoiser, PixelsWithoutASampleTakeTheirSurfacesValue) {
-  const GBuffer g = wall(kSize);
+  const GBuffer g = wall(kOddSize);
   AoDenoiser sparse, none;
   const DenoisedAo& filled = sparse.next_frame(
-      g, samples(kSize, [](uint32_t x, uint32_t y) { return x % 7 == 0 && y % 7 == 0 ? 0.6f : kInvalidAo; }));
-  for (size_t i = 0; i < kSize.pixels(); ++i) ASSERT_NEAR(filled.ao[i], 0.6f, 1e-6f);
-  const DenoisedAo& open = none.next_frame(g, samples(kSize, [](uint32_t, uint32_t) { return kInvalidAo; }));
-  for (size_t i = 0; i < kSize.pixels(); ++i) {
+      g, samples(kOddSize, [](uint32_t x, uint32_t y) { return x % 7 == 0 && y % 7 == 0 ? 0.6f : kInvalidAo; }));
+  for (size_t i = 0; i < kOddSize.pixels(); ++i) ASSERT_NEAR(filled.ao[i], 0.6f, 1e-6f);
+  const DenoisedAo& open = none.next_frame(g, samples(kOddSize, [](uint32_t, uint32_t) { return kInvalidAo; }));
+  for (size_t i = 0; i < kOddSize.pixels(); ++i) {
     ASSERT_EQ(open.ao[i], 1.0f);
     ASSERT_EQ(open.tspp[i], 0.0f);
   }
@@ -166,12 +166,12 @@ TEST(AoDenoiser, PixelsWithoutASampleTakeTheirSurfacesValue) {
 TEST(AoDenoiser, ResetAndResizeForgetEverything) {
   const ImageSize other{31, 50};
   AoDenoiser denoiser, fresh;
-  for (uint32_t f = 0; f < 5; ++f) denoiser.next_frame(wall(kSize), noise(kSize, 0.9f, f));
+  for (uint32_t f = 0; f < 5; ++f) denoiser.next_frame(wall(kOddSize), noise(kOddSize, 0.9f, f));
   denoiser.reset();
-  const DenoisedAo expected = fresh.next_frame(wall(kSize), noise(kSize, 0.2f, 9));
-  const DenoisedAo& cut = denoiser.next_frame(wall(kSize), noise(kSize, 0.2f, 9));
+  const DenoisedAo expected = fresh.next_frame(wall(kOddSize), noise(kOddSize, 0.2f, 9));
+  const DenoisedAo& cut = denoiser.next_frame(wall(kOddSize), noise(kOddSize, 0.2f, 9));
   EXPECT_EQ(cut.ao, expected.ao);
-  EXPECT_EQ(cut.tspp, std::vector<float>(kSize.pixels(), 1.0f));
+  EXPECT_EQ(cut.tspp, std::vector<float>(kOddSize.pixels(), 1.0f));
   const DenoisedAo& resized = denoiser.next_frame(wall(other), noise(other, 0.2f, 10));
   EXPECT_EQ(resized.size, other);
   EXPECT_EQ(resized.tspp, std::vector<float>(other.pixels(), 1.0f));
@@ -191,10 +191,10 @@ TEST(AoDenoiser, ImagesOfAnySizeWork) {
 }
 
 TEST(AoDenoiser, UnchangedGBuffersAreNotReadAgain) {
-  const GBuffer g = wall(kSize), other = wall(kSize, 3.0f);
+  const GBuffer g = wall(kOddSize), other = wall(kOddSize, 3.0f);
   AoDenoiser compared, trusting;
   for (uint32_t f = 0; f < 6; ++f) {
-    const AoFrame frame = noise(kSize, 0.5f, f);
+    const AoFrame frame = noise(kOddSize, 0.5f, f);
     compared.add_frame(g, frame);
     trusting.add_frame(f == 0 ? g : other, frame, HistorySource::kUnchanged); // the first one is read in any case
   }
@@ -204,8 +204,8 @@ TEST(AoDenoiser, UnchangedGBuffersAreNotReadAgain) {
 
 TEST(AoDenoiser, ArraysOfTheWrongSizeAndNumbersOutOfRangeAreRejected) {
   const auto rejects = [](const std::function<void(GBuffer&, AoFrame&)>& change) {
-    GBuffer g = wall(kSize);
-    AoFrame frame = noise(kSize, 0.5f, 0);
+    GBuffer g = wall(kOddSize);
+    AoFrame frame = noise(kOddSize, 0.5f, 0);
     change(g, frame);
     AoDenoiser denoiser;
     try {

@@ -23,7 +23,7 @@ using test::quad;
 using test::render;
 using test::Rendered;
 
-AoConfig visibility(float radius, uint32_t spp = 16) {
+AoConfig visibility_of(float radius, uint32_t spp = 16) {
   AoConfig config;
   config.radius = radius;
   config.spp = spp;
@@ -62,7 +62,7 @@ Scene loose_slivers(float width) {
 TEST(AoVisibility, NothingOccludesLooseSlivers) {
   const auto occluded = [](float width, const EmbreeConfig& config) {
     const Rendered image =
-        render(loose_slivers(width), camera_at({0, 0, -60}, {0, 0, 0}), {320, 180}, visibility(1e-3f), config);
+        render(loose_slivers(width), camera_at({0, 0, -60}, {0, 0, 0}), {320, 180}, visibility_of(1e-3f), config);
     uint64_t hits = 0, occluded_pixels = 0;
     for (const float ao : image.ao.ao) hits += ao >= 0.0f, occluded_pixels += ao >= 0.0f && ao < 1.0f;
     EXPECT_GT(hits, 20u) << width;
@@ -79,7 +79,7 @@ TEST(AoVisibility, NothingOccludesLooseSlivers) {
 }
 
 TEST(AoVisibility, OnlyOccludingMaterialsOcclude) {
-  const auto ao = [](MaterialFlags flags) { return ao_at(roofed(flags), {0, 0, 0}, {0, 1, 0}, visibility(1e6f)); };
+  const auto ao = [](MaterialFlags flags) { return ao_at(roofed(flags), {0, 0, 0}, {0, 1, 0}, visibility_of(1e6f)); };
   EXPECT_LT(ao(0), 1e-4);
   EXPECT_LT(ao(kInvisible), 1e-4);
   EXPECT_LT(ao(kMirror | kEmissive), 1e-4);
@@ -96,7 +96,7 @@ TEST(AoVisibility, MixedMaterialsOfOneInstancedObjectKeepTheirClasses) {
   scene.objects[object].shapes.push_back(scene.objects[1].shapes[0]);
   scene.objects.pop_back();
   scene.instances.push_back({object, Affine(test::placed({0, 0, 0}, DVec3(1), 180))});
-  EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256)), 0.5, 1e-3);
+  EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility_of(1e6f, 256)), 0.5, 1e-3);
 }
 
 /// Stripes of opaque and absent texels, half each, much narrower than the height of the roof.
@@ -107,11 +107,11 @@ TEST(AoVisibility, AlphaMasksOpenTheRoofForTheirRays) {
   Scene scene = roofed(kAlphaMask);
   scene.masks.push_back(stripes());
   scene.materials[1].alpha_mask = 0;
-  const double all_rays = ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256));
+  const double all_rays = ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility_of(1e6f, 256));
   EXPECT_NEAR(all_rays, 0.5, 0.05);
   scene.materials[1] = {"", kShadowAlphaMask, Vec3(0.5f), kNoMask, 0};
-  EXPECT_EQ(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256)), all_rays);
-  AoConfig closest = visibility(1e6f, 256);
+  EXPECT_EQ(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility_of(1e6f, 256)), all_rays);
+  AoConfig closest = visibility_of(1e6f, 256);
   closest.interreflection = 1e-6f; // selects the closest-hit path
   EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, closest), all_rays, 1e-5);
 }
@@ -137,7 +137,7 @@ TEST(AoRobustness, ConvexBodiesDoNotShadowThemselves) {
       }
       const double size = 3.0 * std::max({std::abs(scale.x), std::abs(scale.y), std::abs(scale.z)});
       const Rendered image = render(scene, camera_at(translation - DVec3(0, 0, size), translation), {96, 96},
-                                    visibility(static_cast<float>(size)));
+                                    visibility_of(static_cast<float>(size)));
       uint64_t hits = 0;
       double occluded = 0.0;
       for (const float ao : image.ao.ao) {
@@ -161,8 +161,8 @@ TEST(AoRobustness, InstancesGiveTheAoOfBakedGeometry) {
     add_object(instanced, mesh);
     instanced.instances.push_back({0, Affine(place)});
     const Camera camera = camera_at({3, 4, -6}, {0, 0, 0});
-    const Rendered a = render(baked, camera, {64, 64}, visibility(3)),
-                   b = render(instanced, camera, {64, 64}, visibility(3));
+    const Rendered a = render(baked, camera, {64, 64}, visibility_of(3)),
+                   b = render(instanced, camera, {64, 64}, visibility_of(3));
     uint32_t different = 0;
     for (size_t i = 0; i < a.ao.ao.size(); ++i) different += std::abs(a.ao.ao[i] - b.ao.ao[i]) > 0.05f;
     EXPECT_LE(different, 4u);
@@ -177,7 +177,7 @@ TEST(AoRobustness, AnyScaleGivesTheSameImage) {
     add_shape(scene, test::sphere({0, s, 0}, s, 24));
     add_object(scene, test::box({-s, -s, -s}, {s, s, s}));
     scene.instances.push_back({0, Affine(test::placed(DVec3(3, 1, 1) * scale, {1, 1, -1}, 30))});
-    AoConfig config = visibility(4 * s);
+    AoConfig config = visibility_of(4 * s);
     config.falloff = true;
     return render(scene, camera_at(DVec3(3, 4, -9) * scale, DVec3(0, 0, 0)), {64, 48}, config);
   };
@@ -204,10 +204,10 @@ TEST(AoFrames, FramesOfOneSampleAreOneFrameOfMany) {
   const GBuffer gbuffer = test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 1e-5f);
   Progress progress;
   AoFrame whole, part;
-  trace_ao(source, embree, gbuffer, visibility(1.5f, 32), 3, whole, progress);
+  trace_ao(source, embree, gbuffer, visibility_of(1.5f, 32), 3, whole, progress);
   std::vector<double> sum(gbuffer.size.pixels());
   for (uint32_t frame = 0; frame < 32; ++frame) {
-    trace_ao(source, embree, gbuffer, visibility(1.5f, 1), 96 + frame, part, progress);
+    trace_ao(source, embree, gbuffer, visibility_of(1.5f, 1), 96 + frame, part, progress);
     for (size_t i = 0; i < sum.size(); ++i) sum[i] += part.ao[i];
   }
   for (size_t i = 0; i < sum.size(); ++i) EXPECT_FLOAT_EQ(whole.ao[i], static_cast<float>(sum[i] / 32));
@@ -248,7 +248,7 @@ TEST(AoFrames, SamplesThatAreTracedTogetherGiveTheSameBytes) {
   const GBuffer gbuffer = test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 1e-5f);
   Progress progress;
   for (const bool falloff : {false, true}) {
-    AoConfig config = visibility(1.5f, 7); // 7 = 4 + 3
+    AoConfig config = visibility_of(1.5f, 7); // 7 = 4 + 3
     config.falloff = falloff;
     AoFrame apart, together;
     const CallSizeRecorder few(embree, 1), many(embree, 1u << 20);
@@ -268,7 +268,7 @@ TEST(AoFrames, SamplesThatThePackedTracerTakesTogetherGiveTheSameBytes) {
   const test::BakedScene baked(scene);
   const PackedTracer packed(baked.file, baked.source);
   const CallSizeRecorder one(packed, 1), all(packed, packed.preferred_rays_per_call());
-  AoConfig config = visibility(1.5f, 5); // 5 = 4 + 1
+  AoConfig config = visibility_of(1.5f, 5); // 5 = 4 + 1
   const GBuffer gbuffer = render(scene, camera_at({0, 6, -9}, {0, 1, 0}), {40, 40}, config).gbuffer;
   Progress progress;
   for (const bool falloff : {false, true}) {
@@ -295,7 +295,7 @@ TEST(AoFrames, MissesAreInvalidEvenOverOldContents) {
   frame.ao.assign(63, 0.5f);
   frame.hit_distance.assign(63, 3.0f);
   Progress progress;
-  trace_ao(source, embree, gbuffer, visibility(1), 0, frame, progress);
+  trace_ao(source, embree, gbuffer, visibility_of(1), 0, frame, progress);
   for (size_t i = 0; i < 63; ++i) {
     EXPECT_EQ(frame.ao[i], kInvalidAo);
     EXPECT_EQ(frame.hit_distance[i], 0.0f);
@@ -314,7 +314,7 @@ TEST(AoFrames, CancellingStopsWithinATile) {
       Progress progress;
       Progress::cancel();
       try {
-        trace_ao(source, embree, gbuffer, visibility(1), 0, frame, progress);
+        trace_ao(source, embree, gbuffer, visibility_of(1), 0, frame, progress);
       } catch (const Error& error) {
         const bool finished = std::any_of(frame.ao.begin(), frame.ao.end(), [](float ao) { return ao != kInvalidAo; });
         std::_Exit(finished ? 1 : error.exit_code());
@@ -350,7 +350,7 @@ TEST(AoFrames, SameBytesForAnyThreadCountAndBuild) {
   for (int i = 0; i < 12; ++i)
     add_shape(scene, test::sphere({float(i % 4), 0.5f, float(i / 4)}, 0.45f, 20), i % 3 == 0 ? kTransmissive : 0u);
   const Camera camera = camera_at({2, 3, -5}, {2, 0, 1});
-  AoConfig config = visibility(2, 2);
+  AoConfig config = visibility_of(2, 2);
   for (const bool falloff : {false, true}) {
     config.falloff = falloff;
     const Rendered reference = render(scene, camera, {150, 90}, config);
@@ -370,9 +370,9 @@ TEST(AoFrames, AllBvhVariantsAgree) {
   scene.shapes.pop_back();
   for (int i = 0; i < 9; ++i) add_shape(scene, test::sphere({float(i % 3), 0.5f, float(i / 3)}, 0.49f, 24));
   const Camera camera = camera_at({2, 3, -5}, {1, 0, 1});
-  const Rendered reference = render(scene, camera, {96, 64}, visibility(2));
+  const Rendered reference = render(scene, camera, {96, 64}, visibility_of(2));
   for (const EmbreeConfig& config : {EmbreeConfig{BvhQuality::kHigh, false}, EmbreeConfig{BvhQuality::kMedium, true}}) {
-    const Rendered other = render(scene, camera, {96, 64}, visibility(2), config);
+    const Rendered other = render(scene, camera, {96, 64}, visibility_of(2), config);
     uint32_t different = 0;
     for (size_t i = 0; i < other.ao.ao.size(); ++i) different += reference.ao.ao[i] != other.ao.ao[i];
     EXPECT_LE(different, 20u);

@@ -17,7 +17,7 @@ using test::movers_from;
 using test::placed;
 using test::transforms_of;
 
-constexpr ImageSize kImage{160, 120};
+constexpr ImageSize kVectorImage{160, 120};
 constexpr uint32_t kFloorOnly = 1; ///< number of instances in world space
 
 Scene dancers(uint32_t count) {
@@ -46,8 +46,9 @@ std::vector<Affine> dance(uint32_t count, double time) {
 }
 
 /// Object-space triangles of a source, decoded.
-struct Decoded {
-  explicit Decoded(const SceneSource& source) : positions(source.geometry_count()), triangles(source.geometry_count()) {
+struct DecodedSource {
+  explicit DecodedSource(const SceneSource& source)
+      : positions(source.geometry_count()), triangles(source.geometry_count()) {
     for (uint32_t g = 0; g < source.geometry_count(); ++g) {
       positions[g].resize(source.counts(g).vertices), triangles[g].resize(source.counts(g).triangles);
       source.decode(g, positions[g], triangles[g]);
@@ -91,7 +92,7 @@ struct Errors {
 };
 
 /// Adds what the G-buffer says about moved points minus what the decoded triangles say.
-void add_errors(const SceneSource& source, const Decoded& decoded, const GBuffer& g, std::span<const Affine> now,
+void add_errors(const SceneSource& source, const DecodedSource& decoded, const GBuffer& g, std::span<const Affine> now,
                 std::span<const Affine> before, const PrimaryCamera& camera_before, Errors& errors) {
   for (size_t pixel = 0; pixel < g.size.pixels(); ++pixel) {
     const uint32_t i = g.instance[pixel];
@@ -137,7 +138,7 @@ void expect_found_in_previous_frame(const GBuffer& g, const RayTracer& before, c
 template <typename Make>
 void check_motion(const char* name, const SceneSource& source, uint32_t count, const Make& make) {
   const std::unique_ptr<RayTracer> tracer = make(), behind = make();
-  const Decoded decoded(source);
+  const DecodedSource decoded(source);
   const Movers movers = movers_from(kFloorOnly, source, {});
   std::mt19937 random(17);
   Errors errors;
@@ -151,7 +152,7 @@ void check_motion(const char* name, const SceneSource& source, uint32_t count, c
     const Camera then = camera_at(eye, {0, 1, 0});
     const Camera here =
         camera_at(eye + DVec3(between(random, -0.3, 0.3), 0.1, between(random, -0.5, 0.5)), {0.1, 1, 0});
-    const PrimaryCamera camera(here, kImage), camera_before(then, kImage);
+    const PrimaryCamera camera(here, kVectorImage), camera_before(then, kVectorImage);
     GBuffer g;
     Progress progress;
     trace_primary(source, *tracer, camera, PreviousFrame{camera_before, before}, g, progress);
@@ -196,13 +197,13 @@ struct Stage {
 
 TEST(MotionVectors, AreZeroWhereNothingMoves) {
   const Stage stage;
-  const PrimaryCamera camera(stage.view, kImage);
+  const PrimaryCamera camera(stage.view, kVectorImage);
   const GBuffer still = stage.trace(camera, {camera});
   EXPECT_TRUE(still.previous_z.empty());
   EXPECT_TRUE(std::ranges::all_of(still.motion_px, [](Vec2 m) { return m == Vec2(0); }));
   const GBuffer g = stage.trace(camera, {camera, stage.before});
   size_t moved = 0;
-  for (size_t i = 0; i < kImage.pixels(); ++i) {
+  for (size_t i = 0; i < kVectorImage.pixels(); ++i) {
     if (g.instance[i] == 0 || g.instance[i] == kNoInstance) {
       EXPECT_EQ(g.motion_px[i], Vec2(0));
       EXPECT_EQ(g.previous_z[i], g.view_z[i]);
@@ -228,18 +229,18 @@ public:
   }
 
 private:
-  const Decoded decoded_;
+  const DecodedSource decoded_;
   const SceneSource& source_;
   const uint32_t instance_;
 };
 
 TEST(MotionVectors, FollowDeformingSurfaces) {
   const Stage stage;
-  const PrimaryCamera camera(stage.view, kImage);
+  const PrimaryCamera camera(stage.view, kVectorImage);
   const Fallen fallen(stage.baked.source, 0); // the floor
   const GBuffer g = stage.trace(camera, {camera, {}, &fallen});
   size_t floor = 0;
-  for (size_t i = 0; i < kImage.pixels(); ++i) {
+  for (size_t i = 0; i < kVectorImage.pixels(); ++i) {
     if (g.instance[i] != 0) {
       EXPECT_EQ(g.motion_px[i], Vec2(0));
       continue;
@@ -255,7 +256,7 @@ TEST(MotionVectors, FollowDeformingSurfaces) {
 
 TEST(MotionVectors, NeedTransformsOfAllInstances) {
   const Stage stage;
-  const PrimaryCamera camera(stage.view, kImage);
+  const PrimaryCamera camera(stage.view, kVectorImage);
   EXPECT_THROW(stage.trace(camera, {camera, std::span(stage.before).first(3)}), Error);
 }
 

@@ -13,7 +13,7 @@
 namespace packtrace {
 namespace {
 
-constexpr ImageSize kSize{40, 24};
+constexpr ImageSize kLiftImage{40, 24};
 constexpr float kHalf = 50.0f; // half the side of the floors: far more than the camera sees
 
 Mesh floor_at(float y, bool turned_over) {
@@ -40,7 +40,7 @@ protected:
     Progress progress;
     GBuffer g;
     trace_primary(source, EmbreeTracer(source, {}), camera_, camera_, g, progress);
-    EXPECT_EQ(std::ranges::count(g.instance, 0u), std::ptrdiff_t(kSize.pixels()));
+    EXPECT_EQ(std::ranges::count(g.instance, 0u), std::ptrdiff_t(kLiftImage.pixels()));
     return g;
   }
   /// Mean AO of the visible floor with occlusion rays traced against the coarse scene.
@@ -59,7 +59,7 @@ protected:
   }
   static Mesh far_away() { return test::quad({900, 0, 900}, {0, 0, 1}, {1, 0, 0}); }
 
-  const PrimaryCamera camera_{test::camera_at({0, 10 * GetParam(), 0.01}, {0, 0, 0}), kSize};
+  const PrimaryCamera camera_{test::camera_at({0, 10 * GetParam(), 0.01}, {0, 0, 0}), kLiftImage};
 };
 
 constexpr double kOpen = 1.0;
