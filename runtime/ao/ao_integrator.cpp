@@ -80,7 +80,8 @@ public:
       const TileMemory::Chosen& c = m.chosen[i];
       const double per_sample = 1.0 / c.count;
       out_.ao[c.pixel] = static_cast<float>(m.visibility[i] * per_sample);
-      out_.hit_distance[c.pixel] = static_cast<float>(m.distance[i] * per_sample * double{radius_});
+      if (out_.with_distances)
+        out_.hit_distance[c.pixel] = static_cast<float>(m.distance[i] * per_sample * double{radius_});
     }
     return rays;
   }
@@ -100,7 +101,7 @@ private:
             m.chosen.push_back({x, y, pixel, count});
           } else {
             out_.ao[pixel] = kInvalidAo;
-            out_.hit_distance[pixel] = 0.0f;
+            if (out_.with_distances) out_.hit_distance[pixel] = 0.0f;
           }
         }
     if (!plan_.pixel_count.empty()) std::ranges::stable_sort(m.chosen, std::greater(), &TileMemory::Chosen::count);
@@ -219,7 +220,9 @@ uint32_t least_samples(const SamplePlan& plan) {
 uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
                   const SamplePlan& plan, AoFrame& ao, Progress& progress) {
   validate(config);
-  if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
+  const size_t pixels = gbuffer.size.pixels();
+  if (ao.size != gbuffer.size || ao.ao.size() != pixels || ao.hit_distance.size() != (ao.with_distances ? pixels : 0))
+    ao.resize(gbuffer.size);
   ao.max_history.clear();
   ao.ray_length = config.radius;
   ao.stratified = is_stratified(config.sampler);

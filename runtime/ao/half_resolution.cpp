@@ -117,18 +117,19 @@ uint32_t least_similar(const GBuffer& full, ImageSize half, const std::vector<ui
   return chosen;
 }
 
+/// Without the channels that a G-buffer may do without: neither occlusion nor its denoiser reads them.
 GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& pixel) {
   GBuffer g;
-  g.resize(half);
+  g.keep_channels(0);
+  g.make_room(half);
   g.previous_z.resize(full.previous_z.empty() ? 0 : half.pixels());
   g.pixel_spread = 2.0f * full.pixel_spread;
   for_each_row(half.height, [&](uint32_t by) {
     for (size_t i = size_t{by} * half.width; i < size_t{by + 1} * half.width; ++i) {
       const uint32_t p = pixel[i];
       g.view_z[i] = full.view_z[p], g.position[i] = full.position[p], g.normal[i] = full.normal[p];
-      g.geometric_normal[i] = full.geometric_normal[p], g.albedo[i] = full.albedo[p];
-      g.instance[i] = full.instance[p], g.triangle[i] = full.triangle[p], g.material[i] = full.material[p];
-      g.back_face[i] = full.back_face[p], g.offset[i] = full.offset[p], g.motion_px[i] = full.motion_px[p] * 0.5f;
+      g.geometric_normal[i] = full.geometric_normal[p], g.instance[i] = full.instance[p];
+      g.offset[i] = full.offset[p], g.motion_px[i] = full.motion_px[p] * 0.5f;
       if (!g.previous_z.empty()) g.previous_z[i] = full.previous_z[p];
     }
   });

@@ -21,10 +21,21 @@ inline constexpr uint32_t kNoInstance = ~0u;
 /// used for this.
 inline constexpr float kInvalidAo = -1.0f;
 
-/// Primary visibility of one frame. Every array has one entry per pixel, rows top to bottom.
+/// Channels that a G-buffer may do without.
+enum GBufferChannel : uint32_t {
+  kAlbedoChannel = 1,
+  kTriangleChannel = 2,
+  kMaterialChannel = 4,
+  kBackFaceChannel = 8,
+  kAllChannels = 15,
+};
+
+/// Primary visibility of one frame. Every array has one entry per pixel, rows top to bottom; those of channels that are
+/// not kept are empty.
 /// Pixels whose camera ray misses hold instance kNoInstance and 0 in all other arrays. previous_z may be empty.
 struct GBuffer {
   ImageSize size;
+  uint32_t channels = kAllChannels;   ///< bits of GBufferChannel that are kept; set by keep_channels()
   std::vector<float> view_z;          ///< camera-space z in world units (distance for environment cameras); 0 = miss
   std::vector<Vec3> position;         ///< world space, on the traced (decoded) surface
   std::vector<Vec3> geometric_normal; ///< world space, unit, facing the camera
@@ -45,14 +56,37 @@ struct GBuffer {
   float pixel_spread = 0.0f;
   std::shared_ptr<gpu::DeviceView> on_gpu; ///< memory for a GPU's hits, kept from frame to frame; else null
 
+  /// Makes all pixels misses.
   void resize(ImageSize new_size) {
     size = new_size;
-    const size_t n = new_size.pixels();
-    view_z.assign(n, 0.0f), position.assign(n, Vec3(0)), geometric_normal.assign(n, Vec3(0));
-    normal.assign(n, Vec3(0)), albedo.assign(n, Vec3(0)), instance.assign(n, kNoInstance);
-    triangle.assign(n, 0), material.assign(n, 0), back_face.assign(n, 0), offset.assign(n, 0.0f),
-        motion_px.assign(n, Vec2(0));
+    for_each_array([&](auto& array, bool kept, auto miss) { array.assign(kept ? new_size.pixels() : 0, miss); });
     previous_z.clear();
+  }
+  /// Makes all arrays as long as the image has pixels, for one who writes them. Those that have this length keep their
+  /// values.
+  void make_room(ImageSize new_size) {
+    size = new_size;
+    for_each_array([&](auto& array, bool kept, auto) { array.resize(kept ? new_size.pixels() : 0); });
+  }
+  /// Frees the memory of the other channels. Channels that are kept anew are empty until the next make_room().
+  /// @param kept bits of GBufferChannel
+  void keep_channels(uint32_t kept) {
+    channels = kept;
+    for_each_array([]<class Array>(Array& array, bool is_kept, auto) {
+      if (!is_kept) array = Array(); // frees the memory, which `= {}` would keep
+    });
+  }
+
+private:
+  /// Calls work(array, whether it is kept, value of a miss) for all arrays but previous_z.
+  template <typename Work>
+  void for_each_array(const Work& work) {
+    const auto kept = [this](GBufferChannel channel) { return (channels & channel) != 0; };
+    work(view_z, true, 0.0f), work(position, true, Vec3(0)), work(geometric_normal, true, Vec3(0));
+    work(normal, true, Vec3(0)), work(instance, true, kNoInstance), work(offset, true, 0.0f);
+    work(motion_px, true, Vec2(0));
+    work(albedo, kept(kAlbedoChannel), Vec3(0)), work(triangle, kept(kTriangleChannel), 0u);
+    work(material, kept(kMaterialChannel), 0u), work(back_face, kept(kBackFaceChannel), uint8_t{0});
   }
 };
 
@@ -72,6 +106,8 @@ struct AoFrame {
   /// no meaning until ViewTracer::read_occlusion() fills them in.
   bool may_stay_on_gpu = false;
   std::shared_ptr<gpu::DeviceAo> on_gpu;
+  /// False: hit_distance is not wanted, and stays empty.
+  bool with_distances = true;
   /// Longest history in frames, not negative, that a pixel may keep from the frames before, as history_limits() finds
   /// it where something moved. Empty: no limits.
   std::vector<float> max_history;
@@ -79,7 +115,7 @@ struct AoFrame {
   void resize(ImageSize new_size) {
     size = new_size;
     ao.assign(new_size.pixels(), kInvalidAo);
-    hit_distance.assign(new_size.pixels(), 0.0f);
+    hit_distance.assign(with_distances ? new_size.pixels() : 0, 0.0f);
     max_history.clear();
   }
 };

@@ -55,6 +55,9 @@ public:
       trace_spans(tracer, progress);
   }
 
+  /// Lets the G-buffer begin at this pixel of the image.
+  void begin_at(uint32_t x, uint32_t y) { left_ = x, top_ = y; }
+
   void trace_tile(const Tile& tile) const {
     RayBatch batch;
     for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) trace_row(y, tile, batch);
@@ -133,8 +136,10 @@ private:
     }
   }
 
+  bool keeps(GBufferChannel channel) const { return (out_.channels & channel) != 0; }
+
   size_t pixel_of(uint32_t i, const RayBatch& batch) const {
-    return static_cast<size_t>(batch.columns.y[i]) * out_.size.width + batch.columns.x[i];
+    return static_cast<size_t>(batch.columns.y[i] - top_) * out_.size.width + (batch.columns.x[i] - left_);
   }
 
   void add_hit(uint32_t i, RayBatch& batch) const {
@@ -193,10 +198,12 @@ private:
 
   void write_miss(size_t pixel) const {
     out_.view_z[pixel] = 0.0f;
-    out_.position[pixel] = out_.geometric_normal[pixel] = out_.normal[pixel] = out_.albedo[pixel] = Vec3(0);
+    out_.position[pixel] = out_.geometric_normal[pixel] = out_.normal[pixel] = Vec3(0);
     out_.instance[pixel] = kNoInstance;
-    out_.triangle[pixel] = out_.material[pixel] = 0;
-    out_.back_face[pixel] = 0;
+    if (keeps(kAlbedoChannel)) out_.albedo[pixel] = Vec3(0);
+    if (keeps(kTriangleChannel)) out_.triangle[pixel] = 0;
+    if (keeps(kMaterialChannel)) out_.material[pixel] = 0;
+    if (keeps(kBackFaceChannel)) out_.back_face[pixel] = 0;
     out_.offset[pixel] = 0.0f;
     out_.motion_px[pixel] = Vec2(0);
     if (motion_.any()) out_.previous_z[pixel] = 0.0f;
@@ -215,14 +222,16 @@ private:
     out_.position[pixel] = Vec3(c.position.at(i));
     out_.geometric_normal[pixel] = Vec3(facing);
     out_.normal[pixel] = shading_normal(attributes, *hit.placement, facing);
-    const float width = pixel_width(now_.projection(), out_.pixel_spread, view_z) * textures_.width_px *
-                        static_cast<float>(space_.scale());
-    out_.albedo[pixel] = surface_albedo(source_, textures_.pyramids, hit, attributes.material, Vec2(c.u[i], c.v[i]),
-                                        {batch.rays[i].direction, Vec3(facing), width});
+    if (keeps(kAlbedoChannel)) {
+      const float width = pixel_width(now_.projection(), out_.pixel_spread, view_z) * textures_.width_px *
+                          static_cast<float>(space_.scale());
+      out_.albedo[pixel] = surface_albedo(source_, textures_.pyramids, hit, attributes.material, Vec2(c.u[i], c.v[i]),
+                                          {batch.rays[i].direction, Vec3(facing), width});
+    }
     out_.instance[pixel] = hit.placement->instance;
-    out_.triangle[pixel] = hit.triangle;
-    out_.material[pixel] = attributes.material;
-    out_.back_face[pixel] = glm::dot(c.own_normal.at(i), facing) < 0.0;
+    if (keeps(kTriangleChannel)) out_.triangle[pixel] = hit.triangle;
+    if (keeps(kMaterialChannel)) out_.material[pixel] = attributes.material;
+    if (keeps(kBackFaceChannel)) out_.back_face[pixel] = glm::dot(c.own_normal.at(i), facing) < 0.0;
     out_.offset[pixel] = static_cast<float>(c.offset[i]);
     if (motion_.any())
       std::tie(out_.motion_px[pixel], out_.previous_z[pixel]) = motion_.of({batch.hits[i], hit, view_z, i, c});
@@ -245,6 +254,7 @@ private:
   const SurfaceMotion motion_;
   const TextureFilter textures_;
   GBuffer& out_;
+  uint32_t left_ = 0, top_ = 0;        ///< pixel of the image at which out_ begins
   std::vector<RayHit> view_hits_;      ///< of trace_spans()
   std::span<const RayHit> pixel_hits_; ///< of out_.on_gpu, by pixel
 };
@@ -270,7 +280,7 @@ float pixel_width(const PrimaryCamera& camera, float view_z) {
 
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress, const TextureFilter& textures) {
-  if (gbuffer.size != now.size() || gbuffer.view_z.size() != now.size().pixels()) gbuffer.resize(now.size());
+  gbuffer.make_room(now.size());
   gbuffer.pixel_spread = static_cast<float>(now.pixel_spread());
   PrimaryTracer primary(source, tracer, now, previous, textures, gbuffer);
   gbuffer.previous_z.resize(primary.sees_motion() ? now.size().pixels() : 0);
@@ -280,6 +290,21 @@ void trace_primary(const SceneSource& source, const RayTracer& tracer, const Pri
   else
     gbuffer.on_gpu = nullptr;
   for_each_tile(now.size(), progress, [&](const Tile& tile) { primary.trace_tile(tile); });
+}
+
+std::optional<CameraHit> trace_pixel(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
+                                     uint32_t x, uint32_t y) {
+  const ImageSize size = camera.size();
+  const uint32_t x0 = x - x % kTileSize, y0 = y - y % kTileSize;
+  const Tile tile{x0, y0, std::min(x0 + kTileSize, size.width), std::min(y0 + kTileSize, size.height)};
+  GBuffer g;
+  g.resize({tile.x1 - x0, tile.y1 - y0});
+  PrimaryTracer primary(source, tracer, camera, PreviousFrame{camera}, {}, g);
+  primary.begin_at(x0, y0);
+  primary.trace_tile(tile);
+  const size_t at = size_t{y - y0} * g.size.width + (x - x0);
+  if (g.instance[at] == kNoInstance) return std::nullopt;
+  return CameraHit{g.position[at], g.instance[at], g.triangle[at], g.material[at], g.back_face[at] != 0};
 }
 
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,

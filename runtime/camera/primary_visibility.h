@@ -40,7 +40,7 @@ struct PreviousFrame {
   const SurfaceHistory* surfaces = nullptr; ///< null: no surface deforms
 };
 
-/// Traces one ray per pixel of now's image and fills every field of the G-buffer, which is resized if needed. Positions
+/// Traces one ray per pixel of now's image and fills the channels of the G-buffer, which is resized if needed. Positions
 /// are computed in double from the decoded vertices of the triangle that is hit, so they lie on its plane to within
 /// half an ulp per axis. A surface without vertex normals gets the geometric normal as its shading normal. Motion is
 /// the pixel's centre minus the projection by the previous camera of the place where the same point of the surface was.
@@ -50,6 +50,18 @@ struct PreviousFrame {
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress,
                    const TextureFilter& textures = {});
+
+/// What a camera ray hit, as in GBuffer.
+struct CameraHit {
+  Vec3 position{0};
+  uint32_t instance = kNoInstance, triangle = 0, material = 0;
+  bool back_face = false;
+};
+
+/// Traces the camera ray of a pixel again, with those of its tile, so that it hits what it hit in trace_primary().
+/// Returns none where it misses.
+std::optional<CameraHit> trace_pixel(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
+                                     uint32_t x, uint32_t y);
 
 /// Width that a pixel covers at a depth, across the ray; world units.
 /// @param view_z as in GBuffer::view_z

@@ -48,6 +48,9 @@ RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& glob
   config = make_config(*loaded.source, camera.camera, options, detail);
   config.lod_layers = has_lod_layer(layers);
   config.view_layers = has_view_layer(layers);
+  config.all_channels = false;
+  config.plain_layers = kDepthLayer | kInstanceLayer; // reports need them
+  for (const std::string& layer : layers) config.plain_layers |= plain_layers_of(layer);
   config.surface_layers = has_surface_layer(layers), config.cost_layers = has_cost_layer(layers);
   pixels = reserve_picture(options, config, globals.memory);
   const BakedFile* const file = loaded.baked ? &*loaded.baked : nullptr;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string>
@@ -66,14 +67,19 @@ void find_pivot(ViewSession& session, const ViewOptions& options, const GlobalOp
   session.restart();
 }
 
+bool has_picks(const std::vector<ScriptLine>& script) {
+  return std::ranges::any_of(script, [](const ScriptLine& line) { return line.action == "pick"; });
+}
+
 /// Makes the session as the viewer begins with it.
+/// @param keep_views ViewSession::keep_views()
 /// @param observer gets the progress, besides standard error; may be empty
-std::unique_ptr<ViewSession> start_session(const ViewOptions& options, const GlobalOptions& globals,
+std::unique_ptr<ViewSession> start_session(const ViewOptions& options, const GlobalOptions& globals, bool keep_views,
                                            const Progress::Observer& observer) {
   ProgressDisplay display(globals);
   Progress progress(observer ? both(display.observer(), observer) : display.observer());
   std::unique_ptr<ViewSession> session = make_session(options, globals, display, progress);
-  session->keep_views(!options.profile || options.script); // picks show them
+  session->keep_views(keep_views);
   if (options.render.shade.shades()) session->set_layer(0, options.render.shade.view);
   display.finish();
   Progress first_frame(observer);
@@ -121,12 +127,13 @@ int run_viewer(const ViewOptions& options, const GlobalOptions& globals) {
   if (window) {
     show_in_window(
         view_size(options),
-        [&](const Progress::Observer& observer) { return start_session(options, globals, observer); }, options, globals,
+        // Picks follow the mouse.
+        [&](const Progress::Observer& observer) { return start_session(options, globals, true, observer); }, options, globals,
         outputs);
     result["results"] = outputs.results();
   }
   std::unique_ptr<ViewSession> session;
-  if (!window) session = start_session(options, globals, {});
+  if (!window) session = start_session(options, globals, has_picks(script), {});
   Progress progress;
   if (options.script) {
     ViewControls controls(*session);

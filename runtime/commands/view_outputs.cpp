@@ -14,7 +14,7 @@ namespace packtrace {
 void ViewOutputs::save_pane(ViewSession& session, size_t pane, const std::vector<std::string>& files) {
   for (const std::string& file : files)
     if (file == "-") throw Error(ErrorKind::kUsage, "pictures need a file name");
-  const RenderedImage& image = session.image(pane);
+  const RenderedImage& image = session.shown_image(pane);
   const FrameConfig& config = session.rendered_config(pane);
   const AvailableLayers available{config.detail.camera_uses_levels(), config.denoise, true, config.shades()};
   ImageOutputs outputs(files, {session.pane(pane).image_layer()}, available, globals_.force,

@@ -48,6 +48,17 @@ void FrameConfig::validate() const {
                   "--proxy-beyond requires an interreflection of 0: voxels have no material");
 }
 
+uint32_t gbuffer_channels(const FrameConfig& config) {
+  if (config.all_channels) return kAllChannels;
+  uint32_t channels = 0;
+  const bool albedo = config.shades() || (config.plain_layers & (kAlbedoLayer | kShadedLayer)) != 0;
+  if (albedo) channels |= kAlbedoChannel | kMaterialChannel; // materials tell emitters
+  if (config.shades()) channels |= kBackFaceChannel;
+  if (config.surface_layers) channels |= kTriangleChannel | kMaterialChannel;
+  if (config.lod_layers) channels |= kTriangleChannel;
+  return channels;
+}
+
 uint64_t picture_bytes(const FrameConfig& config) {
   const double pixel_bytes =
       (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0) + (config.shades() ? 300.0 : 0.0);

@@ -74,6 +74,7 @@ struct FrameConfig {
   bool view_layers = false;                ///< fill its views of intermediate results
   bool surface_layers = false;             ///< fill its material flags and clusters
   bool cost_layers = false;                ///< fill what its camera rays visit; needs the packed tracer
+  bool all_channels = true;                ///< FrameLoop::gbuffer() has all channels, not only those of the layers
   FrameView view = FrameView::kAo;
   ShadeConfig shade; ///< of the other views
   // How shaded layers are displayed. No frame depends on it.
@@ -96,6 +97,9 @@ struct FrameConfig {
   /// Throws Error(kUsage) naming the option that is out of range.
   void validate() const;
 };
+
+/// The channels of the G-buffer (bits of GBufferChannel) that frames need for what they are asked to show.
+uint32_t gbuffer_channels(const FrameConfig& config);
 
 /// Approximate memory of the G-buffer, the denoiser and the layers of a view.
 uint64_t picture_bytes(const FrameConfig& config);

@@ -10,7 +10,6 @@
 #include "runtime/camera/deformed_past.h"
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
-#include "runtime/camera/primary_visibility.h"
 #include "runtime/frame/pixel_sums.h"
 #include "runtime/frame/surface_layers.h"
 #include "runtime/stopwatch.h"
@@ -64,6 +63,12 @@ glm::dvec2 jitter_offset(uint32_t frame) {
 }
 
 namespace {
+
+/// Whether someone reads AoFrame::hit_distance.
+bool needs_distances(const FrameConfig& config, const FrameScene& scene) {
+  const bool reference = config.denoise && config.denoiser.kind == DenoiserKind::kReference;
+  return config.view_layers || reference || scene.backend.backend == Backend::kGpu;
+}
 
 /// The denoiser works where rays are traced.
 AoDenoiser made_denoiser(const FrameConfig& config, const FrameScene& scene) {
@@ -119,6 +124,7 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
   const PreviousFrame before{moved_on ? *view_ : view,
                              moved_on ? state_.previous_transforms() : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};
+  gbuffer_.keep_channels(channels_);
   const TextureFilter textures{config_.shades() ? &shading_.prepare(*scene().source, scene().memory).textures()
                                                 : nullptr,
                                footprint_px(config_, still_frames_)};
@@ -140,6 +146,38 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
     half_ = halve(gbuffer_);
     report_.times.upsample_s += halving.seconds();
   }
+}
+
+/// Traces the camera rays of a still view's frames again, up to that of a number, and adds them to the layers.
+/// @param plans the first one chooses levels of detail, as the frame that moved did
+void FrameLoop::trace_still(const Camera& camera, uint32_t frames, bool plans) {
+  layers_.clear();
+  Progress unseen;
+  for (still_frames_ = 0;; ++still_frames_) {
+    report_.moved = plans && still_frames_ == 0;
+    if (traces(still_frames_)) {
+      if (still_frames_ > 0) layers_.keep(gbuffer_);
+      const PrimaryCamera view = view_of(camera, still_frames_);
+      trace_camera_rays(view, unseen);
+      layers_.add(gbuffer_, scene().source->materials());
+      if (plans && config_.lod_layers) add_lod_layers(view);
+    }
+    if (still_frames_ == frames) break;
+  }
+}
+
+/// Traces camera rays again if they were traced without channels that are needed now.
+void FrameLoop::require_channels() {
+  const uint32_t needed = channels_ | gbuffer_channels(config_);
+  if (needed == channels_ || !camera_) return;
+  channels_ = needed;
+  const FrameReport report = report_;
+  trace_still(*camera_, still_frames_, false);
+  report_ = report;
+}
+
+std::optional<CameraHit> FrameLoop::hit_at(uint32_t x, uint32_t y) const {
+  return trace_pixel(state_.camera_source(), *tracers().front(), *traced_view_, x, y);
 }
 
 /// Shades what the camera rays hit. Its tiles do not count in the progress, but it can cancel them.
@@ -205,6 +243,10 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   report_.number = next_number_, report_.hit_pixels = last_hits;
   const bool changed = state_.advance(DVec3(camera.world_from_camera[3]), time_s, report_);
   const bool moved = report_.moved = !view_ || changed || !same_camera(camera, *camera_);
+  if (moved)
+    channels_ = gbuffer_channels(config_);
+  else
+    require_channels();
   still_frames_ = moved ? 0 : still_frames_ + 1;
 
   const bool still_jitter = config_.jitters() && !moved;
@@ -228,6 +270,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   report_.times.denoise_s += limiting.seconds();
   const Stopwatch tracing;
   const SamplePlan plan = sample_plan(shaded, limits);
+  raw_.with_distances = needs_distances(config_, scene());
   raw_.may_stay_on_gpu = config_.denoise && !quarter && scene().backend.backend == Backend::kGpu;
   report_.ao_rays = trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, plan, raw_, progress);
   raw_.max_history = std::move(limits);
@@ -327,6 +370,7 @@ void FrameLoop::show_layers(const FrameConfig& config) {
 
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   PassTimes& times = report.times;
+  require_channels();
   read_samples();
   std::vector<float> raw_mean;
   const std::span<const float> ao = accumulated_ao(raw_mean, report);

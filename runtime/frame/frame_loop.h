@@ -8,6 +8,7 @@
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/adaptive_rate.h"
 #include "runtime/ao/half_resolution.h"
+#include "runtime/camera/primary_visibility.h"
 #include "runtime/denoise/denoiser.h"
 #include "runtime/frame/frame_config.h"
 #include "runtime/frame/frame_report.h"
@@ -55,8 +56,9 @@ public:
   /// Goes on with other settings, whose `detail` is not read: levels of detail stay as they are. All frames are
   /// forgotten; trees are kept. Throws as the constructor does.
   void configure(const FrameConfig& config);
-  /// Sets which of the views, surface and cost layers are filled from the next frame on, and which of the shaded views
-  /// is resolved. Forgets nothing.
+  /// Sets which layers are filled: the plain, surface and cost layers at the next resolve(), for which camera rays are
+  /// traced again if they were traced without what the layers need; views from the next frame on. Also which of the
+  /// shaded views is resolved. Forgets nothing.
   void show_layers(const FrameConfig& config);
 
   /// SceneState::follow_motion().
@@ -84,9 +86,13 @@ public:
   const AoDenoiser& denoiser() const { return denoiser_; }
   /// Camera rays of the last frame that traced any.
   const GBuffer& gbuffer() const { return gbuffer_; }
+  /// What the camera ray of a traced pixel hit in the last frame that traced any; needs one. It is traced again.
+  std::optional<CameraHit> hit_at(uint32_t x, uint32_t y) const;
 
 private:
   void trace_camera_rays(const PrimaryCamera& view, Progress& progress);
+  void trace_still(const Camera& camera, uint32_t frames, bool plans);
+  void require_channels();
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
   bool traces(uint32_t still_frame) const;
   SamplePlan sample_plan(const GBuffer& shaded, std::span<const float> limits);
@@ -105,6 +111,7 @@ private:
   std::optional<PrimaryCamera> traced_view_; ///< of gbuffer_
   uint64_t next_number_ = 0;
   uint32_t still_frames_ = 0; ///< frames since something moved, without the first
+  uint32_t channels_ = 0;     ///< of the G-buffers since something moved
   GBuffer gbuffer_, guides_;
   HalfGBuffer half_;
   AoFrame raw_;

@@ -58,22 +58,11 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
   if (!raw_mean_.restore(shaded.pixels(), mean) || !adaptive_.restore(shaded, rate)) fail();
   if (config_.shades() == shade.empty() || !shading_.restore(config_.traced_size().pixels(), shade)) fail();
   denoiser_.restore(shaded, history);
-  // Camera rays are traced again: they depend on the camera alone.
-  layers_.clear();
-  Progress unseen;
+  // Camera rays depend on the camera alone.
   if (!state_.restore(time_s, {reinterpret_cast<const uint8_t*>(state.data()), state.size()}, report_)) fail();
-  for (still_frames_ = 0;; ++still_frames_) {
-    report_ = {};
-    report_.moved = still_frames_ == 0;
-    if (traces(still_frames_)) {
-      if (still_frames_ > 0) layers_.keep(gbuffer_);
-      const PrimaryCamera view = view_of(camera, still_frames_);
-      trace_camera_rays(view, unseen);
-      layers_.add(gbuffer_, scene().source->materials());
-      if (config_.lod_layers) add_lod_layers(view);
-    }
-    if (still_frames_ == saved.still_frames) break;
-  }
+  report_ = {};
+  channels_ = gbuffer_channels(config_);
+  trace_still(camera, saved.still_frames, true);
   if (config_.shades() && config_.denoise) shading_.keep_surfaces(gbuffer_);
   camera_ = camera;
   view_.emplace(camera, config_.traced_size());

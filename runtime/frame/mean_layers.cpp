@@ -42,10 +42,11 @@ void clear_plain_layers(uint32_t layers, RenderedImage& image) {
 
 void MeanLayers::clear_sums(ImageSize size) {
   const size_t n = size.pixels();
+  const size_t coloured = albedo_kept_ ? n : 0, emitters = emitters_exist_ ? coloured : 0;
   hits_.assign(n, 0.0f), depth_.assign(n, 0.0f);
-  normal_.assign(n, Vec3(0)), albedo_.assign(n, Vec3(0));
+  normal_.assign(n, Vec3(0)), albedo_.assign(coloured, Vec3(0));
   instance_.assign(n, kNoInstance);
-  emitters_.assign(emitters_exist_ ? n : 0, 0.0f), emitter_albedo_.assign(emitters_exist_ ? n : 0, Vec3(0));
+  emitters_.assign(emitters, 0.0f), emitter_albedo_.assign(emitters, Vec3(0));
 }
 
 /// A frame alone.
@@ -53,14 +54,17 @@ MeanLayers::Sums MeanLayers::sums_of(const GBuffer& g, size_t i) const {
   Sums sums;
   if (g.instance[i] == kNoInstance) return sums;
   sums.hits = 1.0f, sums.instance = g.instance[i];
-  sums.depth += g.view_z[i], sums.normal += g.normal[i], sums.albedo += g.albedo[i]; // so that -0 becomes 0
+  sums.depth += g.view_z[i], sums.normal += g.normal[i]; // so that -0 becomes 0
+  if (!albedo_kept_) return sums;
+  sums.albedo += g.albedo[i];
   if (emitters_exist_ && emits(materials_[g.material[i]])) sums.emitters = 1.0f, sums.emitter_albedo += g.albedo[i];
   return sums;
 }
 
 MeanLayers::Sums MeanLayers::sums(const GBuffer& last, size_t i) const {
   if (!kept()) return sums_of(last, i);
-  Sums sums{hits_[i], depth_[i], 0.0f, normal_[i], albedo_[i], Vec3(0.0f), instance_[i]};
+  Sums sums{hits_[i], depth_[i], 0.0f, normal_[i], Vec3(0.0f), Vec3(0.0f), instance_[i]};
+  if (albedo_kept_) sums.albedo = albedo_[i];
   if (!emitters_.empty()) sums.emitters = emitters_[i], sums.emitter_albedo = emitter_albedo_[i];
   return sums;
 }
@@ -70,12 +74,13 @@ void MeanLayers::add(const GBuffer& g, std::span<const Material> materials) {
   pixel_spread_ = g.pixel_spread;
   if (frames_ == 1) {
     kept_ = false;
+    albedo_kept_ = !g.albedo.empty() && !g.material.empty();
     size_ = g.size;
     materials_ = materials;
     emitters_exist_ = std::ranges::any_of(materials, emits);
     return;
   }
-  assert(kept_);
+  assert(kept_ && (!albedo_kept_ || !g.albedo.empty()));
   for_each_image_row(g.size.height, [&](uint32_t y) {
     const size_t begin = static_cast<size_t>(y) * g.size.width, end = begin + g.size.width;
     for (size_t i = begin; i < end; ++i) {
@@ -83,7 +88,8 @@ void MeanLayers::add(const GBuffer& g, std::span<const Material> materials) {
       if (added.hits == 0.0f) continue;
       if (hits_[i] == 0.0f) instance_[i] = added.instance;
       hits_[i] += 1.0f;
-      depth_[i] += added.depth, normal_[i] += added.normal, albedo_[i] += added.albedo;
+      depth_[i] += added.depth, normal_[i] += added.normal;
+      if (albedo_kept_) albedo_[i] += added.albedo;
       if (!emitters_.empty()) emitters_[i] += added.emitters, emitter_albedo_[i] += added.emitter_albedo;
     }
   });
@@ -96,8 +102,8 @@ void MeanLayers::keep(const GBuffer& first) {
     const size_t begin = static_cast<size_t>(y) * size_.width, end = begin + size_.width;
     for (size_t i = begin; i < end; ++i) {
       const Sums sums = sums_of(first, i);
-      hits_[i] = sums.hits, depth_[i] = sums.depth, normal_[i] = sums.normal, albedo_[i] = sums.albedo;
-      instance_[i] = sums.instance;
+      hits_[i] = sums.hits, depth_[i] = sums.depth, normal_[i] = sums.normal, instance_[i] = sums.instance;
+      if (albedo_kept_) albedo_[i] = sums.albedo;
       if (!emitters_.empty()) emitters_[i] = sums.emitters, emitter_albedo_[i] = sums.emitter_albedo;
     }
   });

@@ -61,8 +61,10 @@ void ViewLayers::resolve(const FrameConfig& config, const GBuffer& gbuffer, cons
       if (!motion_px_.empty()) sums.motion += motion_px_[at];
     }
     const size_t from = size_t{y / step} * raw.size.width + x / step;
-    if (raw.ao[from] >= 0.0f)
-      sums.samples += 1.0f, sums.hit_distance += raw.hit_distance[from], sums.local_variance += noise[from];
+    if (raw.ao[from] >= 0.0f) {
+      sums.samples += 1.0f, sums.local_variance += noise[from];
+      if (raw.with_distances) sums.hit_distance += raw.hit_distance[from];
+    }
     if (denoised == nullptr) return;
     sums.variance += denoised->variance[from], sums.history += denoised->tspp[from];
     sums.disocclusion += denoised->tspp[from] <= static_cast<float>(frames) ? 1.0f : 0.0f;

@@ -31,30 +31,32 @@ void add_cluster(const BakedFile& file, Pick::Surface& surface) {
   surface.cluster_bytes.emplace_back("record", sizeof(baked::ClusterRecord));
 }
 
-/// The surface at a pixel of the G-buffer.
-Pick::Surface surface_at(const ViewFile& file, const FrameLoop& loop, size_t at) {
-  const GBuffer& g = loop.gbuffer();
+} // namespace
+
+std::optional<Pick::Surface> pick_surface(const ViewFile& file, const FrameLoop& loop, uint32_t x, uint32_t y) {
+  assert(x < loop.config().size.width && y < loop.config().size.height);
+  const uint32_t factor = loop.config().supersample;
+  const std::optional<CameraHit> hit = loop.hit_at(x * factor + factor / 2, y * factor + factor / 2);
+  if (!hit) return std::nullopt;
   const SceneSource& source = *loop.scene().source;
   Pick::Surface surface;
-  surface.position = DVec3(g.position[at]) + source.origin();
-  surface.instance = g.instance[at];
-  surface.triangle = g.triangle[at], surface.material = g.material[at];
-  surface.back_face = g.back_face[at] != 0;
+  surface.position = DVec3(hit->position) + source.origin();
+  surface.instance = hit->instance;
+  surface.triangle = hit->triangle, surface.material = hit->material;
+  surface.back_face = hit->back_face;
   const SceneSource& traced = *(loop.config().detail.camera_uses_levels() ? &loop.traced_source() : &source);
-  surface.geometry = traced.instances()[g.instance[at]].geometry;
+  surface.geometry = traced.instances()[hit->instance].geometry;
   surface.position_error = traced.position_error(surface.geometry);
-  const SurfaceDetail detail = traced.detail_of(g.instance[at], g.triangle[at]);
+  const SurfaceDetail detail = traced.detail_of(hit->instance, hit->triangle);
   surface.level = detail.level, surface.cluster = detail.cluster, surface.error_world = detail.error_world;
   if (loop.scene().file != nullptr) add_cluster(*loop.scene().file, surface);
   if (file.targets)
-    if (const auto& instances = file.targets().instances; g.instance[at] < instances.size())
-      surface.instance_name = instances[g.instance[at]].name;
+    if (const auto& instances = file.targets().instances; hit->instance < instances.size())
+      surface.instance_name = instances[hit->instance].name;
   if (surface.material < file.material_names.size()) surface.material_name = file.material_names[surface.material];
   surface.flags = material_flag_words(source.materials()[surface.material].flags);
   return surface;
 }
-
-} // namespace
 
 Pick pick_pixel(const ViewFile& file, const PaneRenderer& pane, uint32_t x, uint32_t y) {
   const RenderedImage& image = pane.image();
@@ -75,10 +77,7 @@ Pick pick_pixel(const ViewFile& file, const PaneRenderer& pane, uint32_t x, uint
     for (const char* name : kTracedViews) add(name);
     for (const char* name : kDenoiserViews) add(name);
   }
-  const GBuffer& g = pane.loop().gbuffer();
-  const uint32_t factor = pane.loop().config().supersample;
-  const size_t traced = (size_t{y} * factor + factor / 2) * g.size.width + size_t{x} * factor + factor / 2;
-  if (g.instance[traced] != kNoInstance) pick.surface = surface_at(file, pane.loop(), traced);
+  pick.surface = pick_surface(file, pane.loop(), x, y);
   return pick;
 }
 

@@ -35,6 +35,10 @@ struct Pick {
   std::optional<Surface> surface;
 };
 
+/// The surface that the last frame's camera ray in the middle of a pixel hit; none where it misses. It needs no layers.
+/// @param x, y within FrameConfig::size of the loop, which must have rendered a frame
+std::optional<Pick::Surface> pick_surface(const ViewFile& file, const FrameLoop& loop, uint32_t x, uint32_t y);
+
 /// Looks up a pixel.
 /// @param x, y within the image, which must be resolved
 Pick pick_pixel(const ViewFile& file, const PaneRenderer& pane, uint32_t x, uint32_t y);

@@ -4,11 +4,11 @@
 namespace packtrace {
 
 std::string ViewSession::select(size_t pane, uint32_t x, uint32_t y) {
-  const Pick picked = pick(pane, x, y);
+  const std::optional<Pick::Surface> picked = surface(pane, x, y);
   selection_.reset();
-  if (!picked.surface) return {};
-  selection_ = {panes_[renderers_.at(pane) ? pane : 0].file, picked.surface->instance};
-  return picked.surface->instance_name;
+  if (!picked) return {};
+  selection_ = {panes_[renderers_.at(pane) ? pane : 0].file, picked->instance};
+  return picked->instance_name;
 }
 
 /// Shows the scene after an instance was moved.

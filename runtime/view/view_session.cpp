@@ -158,9 +158,9 @@ void ViewSession::turn_lights(double degrees) {
 }
 
 bool ViewSession::set_pivot(uint32_t x, uint32_t y) {
-  const Pick picked = pick(pane_at(x), x, y);
-  if (!picked.surface) return false;
-  camera_.set_pivot(picked.surface->position - files_[0].at_rest.source->origin());
+  const std::optional<Pick::Surface> shown = surface(pane_at(x), x, y);
+  if (!shown) return false;
+  camera_.set_pivot(shown->position - files_[0].at_rest.source->origin());
   return true;
 }
 
@@ -182,6 +182,7 @@ FrameConfig ViewSession::frame_config(const PaneState& pane, uint32_t quality) c
   config.size = size_;
   config.lod_layers = config.detail.camera_uses_levels();
   config.ao.radius = ao_radius(config.ao, files_[pane.file].at_rest.source->world_bounds());
+  config.all_channels = false; // picks trace their pixels again
   config.plain_layers = keep_views_ ? uint32_t{kAllPlainLayers} : 0;
   for (size_t i = 0; i < shown_panes(); ++i) {
     const std::vector<std::string> layer{panes_[i].layer};
@@ -266,7 +267,6 @@ void ViewSession::resolve() {
   }
 }
 
-/// The image of a pane with the layers that are shown.
 const RenderedImage& ViewSession::shown_image(size_t pane) {
   resolve();
   return renderers_[renderers_.at(pane) ? pane : 0]->image();
@@ -308,14 +308,27 @@ FileContents ViewSession::contents(size_t pane) const {
   return file_contents(files_[panes_[shown].file], *renderers_[shown]);
 }
 
+/// The pixel of a pane's image, which is smaller than the picture while something moves.
+std::array<uint32_t, 2> ViewSession::traced_pixel(size_t pane, uint32_t x, uint32_t y) const {
+  require_view(x < size_.width && y < size_.height,
+               fmt::format("pixel {}, {} is outside the picture of {} x {} pixels", x, y, size_.width, size_.height));
+  const ImageSize traced = rendered_config(pane).size;
+  return {x * traced.width / size_.width, y * traced.height / size_.height};
+}
+
 Pick ViewSession::pick(size_t pane, uint32_t x, uint32_t y) {
   image(pane);
   const size_t shown = renderers_.at(pane) ? pane : 0;
-  require_view(x < size_.width && y < size_.height,
-               fmt::format("pixel {}, {} is outside the picture of {} x {} pixels", x, y, size_.width, size_.height));
-  const ImageSize traced = renderers_[shown]->image().size; // smaller while something moves
-  return pick_pixel(files_[panes_[shown].file], *renderers_[shown], x * traced.width / size_.width,
-                    y * traced.height / size_.height);
+  const auto [column, row] = traced_pixel(shown, x, y);
+  return pick_pixel(files_[panes_[shown].file], *renderers_[shown], column, row);
+}
+
+/// What a pixel of a pane shows, or of the first pane for one that is not shown.
+std::optional<Pick::Surface> ViewSession::surface(size_t pane, uint32_t x, uint32_t y) const {
+  require_view(renderers_[0] != nullptr && last_.report.frames > 0, "no frame has been rendered yet");
+  const size_t shown = renderers_.at(pane) ? pane : 0;
+  const auto [column, row] = traced_pixel(shown, x, y);
+  return pick_surface(files_[panes_[shown].file], renderers_[shown]->loop(), column, row);
 }
 
 size_t ViewSession::pane_at(uint32_t x) const {

@@ -145,8 +145,10 @@ public:
   }
 
   // The result of the frames so far; needs a step() before.
-  /// The image of a pane; of the first one for a pane that is not shown.
+  /// The image of a pane with all plain layers; of the first one for a pane that is not shown.
   const RenderedImage& image(size_t pane);
+  /// Does the same with the layers that are shown alone, which takes less memory.
+  const RenderedImage& shown_image(size_t pane);
   /// The settings with which it was rendered.
   const FrameConfig& rendered_config(size_t pane) const;
   /// The picture on the screen, as three channels of display values, without legends.
@@ -166,12 +168,13 @@ private:
   size_t shown_panes() const { return split_ == SplitMode::kOff ? 1 : 2; }
   void prepare(uint32_t quality);
   FrameConfig frame_config(const PaneState& pane, uint32_t quality) const;
+  std::array<uint32_t, 2> traced_pixel(size_t pane, uint32_t x, uint32_t y) const;
+  std::optional<Pick::Surface> surface(size_t pane, uint32_t x, uint32_t y) const;
   void require_layer(const PaneState& pane) const;
   void change_pane(size_t index, const PaneState& changed);
   Camera camera_in(size_t file) const;
   void show_moved();
   void resolve();
-  const RenderedImage& shown_image(size_t pane);
 
   std::vector<ViewFile> files_;
   ViewCamera camera_;
