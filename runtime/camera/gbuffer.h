@@ -7,6 +7,7 @@
 
 #include "pbrt_import/scene/image_size.h"
 #include "pbrt_import/scene/math.h"
+#include "runtime/camera/pixel_array.h"
 
 namespace packtrace {
 
@@ -35,17 +36,17 @@ enum GBufferChannel : uint32_t {
 /// Pixels whose camera ray misses hold instance kNoInstance and 0 in all other arrays. previous_z may be empty.
 struct GBuffer {
   ImageSize size;
-  uint32_t channels = kAllChannels;   ///< bits of GBufferChannel that are kept; set by keep_channels()
-  std::vector<float> view_z;          ///< camera-space z in world units (distance for environment cameras); 0 = miss
-  std::vector<Vec3> position;         ///< world space, on the traced (decoded) surface
-  std::vector<Vec3> geometric_normal; ///< world space, unit, facing the camera
-  std::vector<Vec3> normal;           ///< shading normal: world space, unit, in the geometric normal's hemisphere
-  std::vector<Vec3> albedo;           ///< linear sRGB
-  std::vector<uint32_t> instance;     ///< SceneSource::instances() index
-  std::vector<uint32_t> triangle;     ///< index in the instance's geometry
-  std::vector<uint32_t> material;     ///< SceneSource::materials() index
-  std::vector<uint8_t> back_face;     ///< 1 where the camera sees the triangle's back (its winding normal points away)
-  std::vector<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
+  uint32_t channels = kAllChannels;  ///< bits of GBufferChannel that are kept; set by keep_channels()
+  std::vector<float> view_z;         ///< camera-space z in world units (distance for environment cameras); 0 = miss
+  PixelArray<Vec3> position;         ///< world space, on the traced (decoded) surface
+  PixelArray<Vec3> geometric_normal; ///< world space, unit, facing the camera
+  std::vector<Vec3> normal;          ///< shading normal: world space, unit, in the geometric normal's hemisphere
+  std::vector<Vec3> albedo;          ///< linear sRGB
+  std::vector<uint32_t> instance;    ///< SceneSource::instances() index
+  std::vector<uint32_t> triangle;    ///< index in the instance's geometry
+  std::vector<uint32_t> material;    ///< SceneSource::materials() index
+  std::vector<uint8_t> back_face;    ///< 1 where the camera sees the triangle's back (its winding normal points away)
+  PixelArray<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
   /// Screen-space motion since the previous frame in pixels (x right, y down): this pixel's centre minus the motion is
   /// where the previous frame saw the same surface point.
   std::vector<Vec2> motion_px;
@@ -76,6 +77,11 @@ struct GBuffer {
       if (!is_kept) array = Array(); // frees the memory, which `= {}` would keep
     });
   }
+  /// Frees position, geometric_normal and offset, from which rays start, until the next make_room().
+  void forget_points() {
+    position = PixelArray<Vec3>(), geometric_normal = PixelArray<Vec3>(), offset = PixelArray<float>();
+  }
+  bool has_points() const { return position.size() == size.pixels(); }
 
 private:
   /// Calls work(array, whether it is kept, value of a miss) for all arrays but previous_z.

@@ -40,13 +40,13 @@ struct PreviousFrame {
   const SurfaceHistory* surfaces = nullptr; ///< null: no surface deforms
 };
 
-/// Traces one ray per pixel of now's image and fills the channels of the G-buffer, which is resized if needed. Positions
-/// are computed in double from the decoded vertices of the triangle that is hit, so they lie on its plane to within
-/// half an ulp per axis. A surface without vertex normals gets the geometric normal as its shading normal. Motion is
-/// the pixel's centre minus the projection by the previous camera of the place where the same point of the surface was.
-/// It is exactly zero for surfaces that did not move under equal cameras. ray_offset.h describes offset. The result is
-/// the same for any number of threads. Throws Error(kCancelled), and Error(kUsage) for previous transforms that are not
-/// one per instance.
+/// Traces one ray per pixel of now's image and fills the channels of the G-buffer, which is resized if needed.
+/// Positions are computed in double from the decoded vertices of the triangle that is hit, so they lie on its plane to
+/// within half an ulp per axis. A surface without vertex normals gets the geometric normal as its shading normal.
+/// Motion is the pixel's centre minus the projection by the previous camera of the place where the same point of the
+/// surface was. It is exactly zero for surfaces that did not move under equal cameras. ray_offset.h describes offset.
+/// The result is the same for any number of threads. Throws Error(kCancelled), and Error(kUsage) for previous
+/// transforms that are not one per instance.
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress,
                    const TextureFilter& textures = {});

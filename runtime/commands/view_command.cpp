@@ -52,7 +52,7 @@ std::unique_ptr<ViewSession> make_session(const ViewOptions& options, const Glob
 /// Renders a frame to see what is in the middle of the view, which becomes the camera's pivot. Frames the whole scene
 /// if the camera of the start sees nothing and was not asked for.
 void find_pivot(ViewSession& session, const ViewOptions& options, const GlobalOptions& globals, Progress& progress) {
-  session.step(progress);
+  session.step_once(progress);
   const ImageSize size = session.size();
   if (!session.last().report.seen && !options.render.camera) {
     const SceneSource& source = *session.files().front().at_rest.source;
@@ -61,10 +61,9 @@ void find_pivot(ViewSession& session, const ViewOptions& options, const GlobalOp
     ViewCamera framing(framing_camera(source.world_bounds(), size, source.cameras()), source.origin(), DVec3(0, 1, 0),
                        source.world_bounds().diagonal());
     session.move_camera([&](ViewCamera& camera) { camera.set(framing.current_key()); });
-    session.step(progress);
+    session.step_once(progress);
   }
   session.set_pivot(size.width / 2, size.height / 2);
-  session.restart();
 }
 
 bool has_picks(const std::vector<ScriptLine>& script) {
@@ -128,8 +127,8 @@ int run_viewer(const ViewOptions& options, const GlobalOptions& globals) {
     show_in_window(
         view_size(options),
         // Picks follow the mouse.
-        [&](const Progress::Observer& observer) { return start_session(options, globals, true, observer); }, options, globals,
-        outputs);
+        [&](const Progress::Observer& observer) { return start_session(options, globals, true, observer); }, options,
+        globals, outputs);
     result["results"] = outputs.results();
   }
   std::unique_ptr<ViewSession> session;

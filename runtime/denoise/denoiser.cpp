@@ -75,6 +75,8 @@ void AoDenoiser::restore(ImageSize size, std::span<const std::byte> bytes) {
 
 void AoDenoiser::reset() { pipeline_->reset(); }
 
+void AoDenoiser::free_spare_memory() { pipeline_->free_spare_memory(); }
+
 size_t AoDenoiser::state_bytes() const { return pipeline_->state_bytes(); }
 
 std::vector<DenoiserPassTime> AoDenoiser::pass_times() const { return pipeline_->pass_times(); }

@@ -106,7 +106,7 @@ private:
         width_, {h.mean.row(y) + x_, h.samples.row(y) + x_, input_->guides.disparity.row(y) + x_, h.square.row(y) + x_},
         window, terms_, estimate_.row(0), {value_.row(y), precision_.row(y), lone_.row(y)});
     fill(y);
-    if (y >= first_written_ && y < last_written_)
+    if (y >= first_written_ && y < last_written_ && !output_->variance.empty())
       std::copy(estimate_.row(0) + begin_written_, estimate_.row(0) + end_written_,
                 &output_->variance[output_index(begin_written_, y)]);
   }

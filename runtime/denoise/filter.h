@@ -22,7 +22,7 @@ struct FilterInput {
   uint32_t samples; ///< AoFrame::samples
 };
 
-/// Where the filter writes; one entry per pixel, as in DenoisedAo.
+/// Where the filter writes; one entry per pixel, as in DenoisedAo. Without variance it is not written.
 struct FilterOutput {
   std::span<float> ao, variance, tspp;
 };

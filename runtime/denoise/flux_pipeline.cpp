@@ -26,6 +26,7 @@ public:
   void restore(ImageSize size, std::span<const std::byte> bytes) override;
   void reset() override { has_frame_ = false; }
   size_t state_bytes() const override;
+  void free_spare_memory() override;
 
 private:
   /// Calls work(plane) for everything that the next frame needs of this one.
@@ -37,11 +38,13 @@ private:
     work(h.mean), work(h.samples), work(h.square), work(h.fast), work(self.trends_);
   }
   bool load_guides(const GBuffer& gbuffer);
+  void make_room_for_pairs();
 
   FluxConfig config_;
   bool has_frame_ = false;
   bool pair_guides_outdated_ = false; ///< they do not belong to the guides
-  /// `before_` is used while a frame is added. Until the next one that moves it is the memory of pair_guides_.
+  /// `before_` is used while a frame is added. Until the next one that moves three of its planes are the memory of
+  /// pair_guides_, and it may have no memory.
   FrameHistory now_, before_;
   Plane<uint32_t> trends_; ///< trend.h
   PairGuides pair_guides_;
@@ -54,11 +57,12 @@ private:
 };
 
 void FluxPipeline::resize(ImageSize size) {
-  for (FrameHistory* frame : {&now_, &before_}) frame->guides.resize(size), frame->history.resize(size);
+  now_.guides.resize(size), now_.history.resize(size);
+  free_spare_memory();
   trends_.resize(size);
   result_.size = size;
   result_.ao.assign(size.pixels(), kInvalidAo);
-  result_.variance.assign(size.pixels(), 0.0f);
+  result_.variance.clear();
   result_.tspp.assign(size.pixels(), 0.0f);
   has_frame_ = false;
 }
@@ -67,6 +71,7 @@ void FluxPipeline::resize(ImageSize size) {
 bool FluxPipeline::load_guides(const GBuffer& gbuffer) {
   if (has_frame_ && now_.guides.still_matches(gbuffer)) return false;
   std::swap(now_, before_);
+  now_.guides.make_room(gbuffer.size), now_.history.make_room(gbuffer.size);
   now_.guides.load(gbuffer);
   if (!has_frame_) before_.history.resize(gbuffer.size);
   pair_guides_outdated_ = true;
@@ -93,8 +98,22 @@ void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistoryS
       now_.history, trends_);
 }
 
-const DenoisedAo& FluxPipeline::denoise(bool) {
+/// Takes memory for the pair guides. What only frames that move need is freed while nothing moves.
+void FluxPipeline::make_room_for_pairs() {
+  Guides& g = before_.guides;
+  History& h = before_.history;
+  if (!moving_)
+    g.normal_x.free(), g.normal_y.free(), g.normal_z.free(), h.samples.free(), h.square.free(), h.fast.free();
+  g.disparity.make_room(result_.size), g.instance.make_room(result_.size), h.mean.make_room(result_.size);
+}
+
+const DenoisedAo& FluxPipeline::denoise(bool with_variance) {
+  if (with_variance)
+    result_.variance.resize(result_.size.pixels());
+  else
+    result_.variance = std::vector<float>(); // frees the memory
   if (!has_frame_) return result_;
+  if (pair_guides_outdated_) make_room_for_pairs();
   if (pair_guides_outdated_)
     pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()),
                          {before_.guides.disparity, before_.guides.instance, before_.history.mean});
@@ -102,6 +121,11 @@ const DenoisedAo& FluxPipeline::denoise(bool) {
   filter_.run({now_.guides, pair_guides_, now_.history, trends_, moving_, stratified_, samples_},
               {result_.ao, result_.variance, result_.tspp});
   return result_;
+}
+
+void FluxPipeline::free_spare_memory() {
+  before_ = {};
+  pair_guides_outdated_ = true;
 }
 
 size_t FluxPipeline::state_bytes() const {

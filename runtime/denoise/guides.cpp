@@ -54,6 +54,12 @@ void Guides::resize(ImageSize new_size) {
   disparity.resize(size), normal_x.resize(size), normal_y.resize(size), normal_z.resize(size), instance.resize(size);
 }
 
+void Guides::make_room(ImageSize new_size) {
+  size = new_size;
+  disparity.make_room(size), instance.make_room(size);
+  normal_x.make_room(size), normal_y.make_room(size), normal_z.make_room(size);
+}
+
 void Guides::load(const GBuffer& gbuffer) {
   const int width = static_cast<int>(size.width);
   for_row_blocks(size.height, [&](int first, int last) {

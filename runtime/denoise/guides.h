@@ -22,6 +22,8 @@ struct Guides {
   Plane<uint32_t> instance;
 
   void resize(ImageSize new_size);
+  /// Plane::make_room() of all planes.
+  void make_room(ImageSize new_size);
   size_t bytes() const {
     return disparity.bytes() + normal_x.bytes() + normal_y.bytes() + normal_z.bytes() + instance.bytes();
   }

@@ -12,6 +12,10 @@ struct History {
   Plane<uint16_t> fast;   ///< fast history: mean AO of the last few frames, in the same units
 
   void resize(ImageSize size) { mean.resize(size), samples.resize(size), square.resize(size), fast.resize(size); }
+  /// Plane::make_room() of all planes.
+  void make_room(ImageSize size) {
+    mean.make_room(size), samples.make_room(size), square.make_room(size), fast.make_room(size);
+  }
   size_t bytes() const { return mean.bytes() + samples.bytes() + square.bytes() + fast.bytes(); }
 };
 

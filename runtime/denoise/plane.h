@@ -24,6 +24,23 @@ public:
     stride_ = static_cast<size_t>(size.width) + 2 * kPlaneBorder;
     data_.assign(stride_ * (static_cast<size_t>(size.height) + 2 * kPlaneBorder), T{});
   }
+  /// Gives a plane without memory, or of another size, pixels without a value and a border of zeros.
+  void make_room(ImageSize size) {
+    const size_t stride = static_cast<size_t>(size.width) + 2 * kPlaneBorder;
+    const size_t rows = static_cast<size_t>(size.height) + 2 * kPlaneBorder;
+    if (stride_ == stride && data_.size() == stride * rows) return;
+    stride_ = stride;
+    data_ = {};
+    data_.resize(stride * rows);
+    const auto zero = [this](size_t begin, size_t end) {
+      std::fill(data_.begin() + static_cast<ptrdiff_t>(begin), data_.begin() + static_cast<ptrdiff_t>(end), T{});
+    };
+    zero(0, offset(0));
+    for (int y = 0; y < static_cast<int>(size.height); ++y) zero(offset(y) + size.width, offset(y + 1));
+    zero(offset(static_cast<int>(size.height)), data_.size());
+  }
+  /// Frees the memory.
+  void free() { *this = Plane(); }
   void clear() { std::fill(data_.begin(), data_.end(), T{}); }
 
   /// Pointer to pixel (0, y), for y in [-kPlaneBorder, height + kPlaneBorder). Columns [-kPlaneBorder, width +
@@ -39,7 +56,7 @@ public:
 private:
   size_t offset(int y) const { return static_cast<size_t>(y + kPlaneBorder) * stride_ + kPlaneBorder; }
   size_t stride_ = 0;
-  std::vector<T> data_;
+  PixelArray<T> data_;
 };
 
 /// Number of rows per task. It is fixed so that results do not depend on the number of threads.

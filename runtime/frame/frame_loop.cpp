@@ -1,15 +1,12 @@
 #include "runtime/frame/frame_loop.h"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <string_view>
 
 #include "pbrt_import/base/error.h"
 #include "runtime/ao/moved_occluders.h"
-#include "runtime/camera/deformed_past.h"
 #include "runtime/camera/lod_view.h"
-#include "runtime/camera/origin_lift.h"
 #include "runtime/frame/pixel_sums.h"
 #include "runtime/frame/surface_layers.h"
 #include "runtime/stopwatch.h"
@@ -19,23 +16,10 @@
 namespace packtrace {
 namespace {
 
-/// Frames of a still view that share an offset of the camera rays. With 32 frames, 2 give as good images as 1 and half
-/// as many camera rays; 4 lose 0.5 to 1 dB (docs/denoiser.md).
-constexpr uint32_t kFramesPerOffset = 2;
-
 /// Marks that nothing has moved since the G-buffer was traced.
 void forget_motion(GBuffer& gbuffer) {
   gbuffer.motion_px.assign(gbuffer.motion_px.size(), Vec2(0));
   gbuffer.previous_z.clear();
-}
-
-/// Side of the square of the image that a camera ray stands for in the textures' filter. Camera rays of a still view
-/// share the pixel, so that its mean is as sharp as that of points.
-/// @param still_frame number of frames since something moved
-float footprint_px(const FrameConfig& config, uint32_t still_frame) {
-  if (!config.jitters()) return 1.0f;
-  const uint32_t rounds = still_frame / kFramesPerOffset + 1; // of offsets, this one included
-  return 1.0f / std::sqrt(static_cast<float>(rounds));
 }
 
 FrameConfig validated(const FrameConfig& config, const FrameScene& scene) {
@@ -50,19 +34,6 @@ bool same_camera(const Camera& a, const Camera& b) {
   return a.projection == b.projection && a.world_from_camera == b.world_from_camera && a.fov_degrees == b.fov_degrees &&
          a.screen_window == b.screen_window && a.width_px == b.width_px && a.height_px == b.height_px;
 }
-
-} // namespace
-
-glm::dvec2 jitter_offset(uint32_t frame) {
-  const auto offset = [&](uint32_t base) {
-    double inverse = 0.0, digit = 1.0;
-    for (uint32_t n = frame; n > 0; n /= base) inverse += (digit /= base) * (n % base);
-    return inverse < 0.5 ? inverse : inverse - 1.0;
-  };
-  return {offset(3), offset(5)};
-}
-
-namespace {
 
 /// Whether someone reads AoFrame::hit_distance.
 bool needs_distances(const FrameConfig& config, const FrameScene& scene) {
@@ -109,84 +80,13 @@ uint64_t FrameLoop::frame_pixels() const {
   return uint64_t{(size.width + 1) / 2} * ((size.height + 1) / 2);
 }
 
-/// Traces the camera rays into gbuffer_. Their tiles do not count in the progress, but it can cancel them.
-void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress) {
-  const bool levels = config_.detail.camera_uses_levels();
-  if (levels && report_.moved) state_.choose_detail(view, nullptr, report_);
-  if (!levels) state_.build_level_0(report_);
-  const RayTracer& tracer = *tracers().front();
-  Progress unseen([&progress](std::string_view, uint64_t, uint64_t) { progress.advance(0); });
-  const Stopwatch tracing;
-  const bool moved_on = report_.moved && view_; // not the first frame
-  std::optional<DeformedPast> surfaces;
-  if (const PackedTracer* deforming = state_.deforming_tracer(); moved_on && deforming != nullptr)
-    surfaces.emplace(*deforming);
-  const PreviousFrame before{moved_on ? *view_ : view,
-                             moved_on ? state_.previous_transforms() : std::span<const Affine>(),
-                             surfaces ? &*surfaces : nullptr};
-  gbuffer_.keep_channels(channels_);
-  const TextureFilter textures{config_.shades() ? &shading_.prepare(*scene().source, scene().memory).textures()
-                                                : nullptr,
-                               footprint_px(config_, still_frames_)};
-  trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen, textures);
-  traced_view_.emplace(view);
-  report_.times.primary_s = tracing.seconds();
-  report_.primary_rays = gbuffer_.size.pixels();
-  report_.hit_pixels = count_hits(gbuffer_);
-  if (config_.proxy_beyond_px && report_.moved)
-    state_.choose_proxies(view, gbuffer_, *config_.proxy_beyond_px, config_.proxy_error, config_.ao, report_);
-  if (config_.detail.only_occlusion && detail() != nullptr) {
-    if (report_.moved) state_.choose_detail(view, &gbuffer_, report_);
-    const Stopwatch lifting;
-    lift_origins(*tracers().back(), view, *config_.detail.error_px, gbuffer_, unseen);
-    report_.times.ao_s += lifting.seconds();
-  }
-  if (config_.ao_resolution == AoResolution::kQuarter) {
-    const Stopwatch halving;
-    half_ = halve(gbuffer_);
-    report_.times.upsample_s += halving.seconds();
-  }
-}
-
-/// Traces the camera rays of a still view's frames again, up to that of a number, and adds them to the layers.
-/// @param plans the first one chooses levels of detail, as the frame that moved did
-void FrameLoop::trace_still(const Camera& camera, uint32_t frames, bool plans) {
-  layers_.clear();
-  Progress unseen;
-  for (still_frames_ = 0;; ++still_frames_) {
-    report_.moved = plans && still_frames_ == 0;
-    if (traces(still_frames_)) {
-      if (still_frames_ > 0) layers_.keep(gbuffer_);
-      const PrimaryCamera view = view_of(camera, still_frames_);
-      trace_camera_rays(view, unseen);
-      layers_.add(gbuffer_, scene().source->materials());
-      if (plans && config_.lod_layers) add_lod_layers(view);
-    }
-    if (still_frames_ == frames) break;
-  }
-}
-
-/// Traces camera rays again if they were traced without channels that are needed now.
-void FrameLoop::require_channels() {
-  const uint32_t needed = channels_ | gbuffer_channels(config_);
-  if (needed == channels_ || !camera_) return;
-  channels_ = needed;
-  const FrameReport report = report_;
-  trace_still(*camera_, still_frames_, false);
-  report_ = report;
-}
-
-std::optional<CameraHit> FrameLoop::hit_at(uint32_t x, uint32_t y) const {
-  return trace_pixel(state_.camera_source(), *tracers().front(), *traced_view_, x, y);
-}
-
 /// Shades what the camera rays hit. Its tiles do not count in the progress, but it can cancel them.
 /// @param changed something other than the camera has moved
 void FrameLoop::shade_frame(bool changed, Progress& progress) {
   Progress unseen([&progress](std::string_view, uint64_t, uint64_t) { progress.advance(0); });
   const Stopwatch shading;
   const ShadeSamples samples{config_.ao.seed, next_number_, ao_radius(config_.ao, traced_source().world_bounds()),
-                             footprint_px(config_, still_frames_)};
+                             footprint_px()};
   report_.shade_rays = shading_.add(
       {state_.camera_source(), *tracers().front(), *traced_view_, gbuffer_, samples, report_.moved, changed}, config_,
       unseen);
@@ -213,16 +113,6 @@ void FrameLoop::add_lod_layers(const PrimaryCamera& view) {
     }
 }
 
-/// Whether camera rays are traced in a frame, counted from the last that moved.
-bool FrameLoop::traces(uint32_t still_frame) const {
-  return still_frame == 0 || (config_.jitters() && still_frame % kFramesPerOffset == 0);
-}
-
-PrimaryCamera FrameLoop::view_of(const Camera& camera, uint32_t still_frame) const {
-  const glm::dvec2 offset = config_.jitters() ? jitter_offset(still_frame / kFramesPerOffset) : glm::dvec2(0.0);
-  return {camera, config_.traced_size(), offset};
-}
-
 /// The samples of the next frame.
 SamplePlan FrameLoop::sample_plan(const GBuffer& shaded, std::span<const float> limits) {
   if (config_.ao_rate == AoRate::kAdaptive) return adaptive_.next_frame(shaded, !report_.moved, config_.ao.spp, limits);
@@ -237,6 +127,22 @@ SamplePlan FrameLoop::sample_plan(const GBuffer& shaded, std::span<const float> 
   return plan;
 }
 
+/// Adds the frame's occlusion to the history.
+/// @param shaded the surfaces from which its rays start
+void FrameLoop::accumulate(const GBuffer& shaded) {
+  const Stopwatch accumulating;
+  if (!config_.denoise) {
+    if (report_.moved) raw_mean_.clear();
+    raw_mean_.add(raw_);
+  } else if (config_.jitters() && !report_.moved) {
+    layers_.write_guides(gbuffer_, guides_);
+    denoiser_.add_frame(guides_, raw_, HistorySource::kPixel);
+  } else {
+    denoiser_.add_frame(shaded, raw_, report_.moved ? HistorySource::kMotion : HistorySource::kUnchanged);
+  }
+  report_.times.denoise_s += accumulating.seconds();
+}
+
 const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Progress& progress) {
   const uint64_t last_hits = report_.hit_pixels; // stays unless camera rays are traced
   report_ = {};
@@ -246,10 +152,11 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   if (moved)
     channels_ = gbuffer_channels(config_);
   else
-    require_channels();
+    require_surfaces(true);
   still_frames_ = moved ? 0 : still_frames_ + 1;
 
-  const bool still_jitter = config_.jitters() && !moved;
+  const bool passing = moved && expects_movement_;
+  if (passing) denoiser_.free_spare_memory();
   const bool trace = traces(still_frames_);
   const PrimaryCamera view = view_of(camera, still_frames_);
   if (trace && !moved) layers_.keep(gbuffer_);
@@ -261,7 +168,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
 
   const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
   if (quarter && still_frames_ == 1) forget_motion(half_.gbuffer);
-  const GBuffer& shaded = quarter ? half_.gbuffer : gbuffer_;
+  const GBuffer& shaded = shaded_surfaces();
   const Stopwatch limiting;
   std::vector<float> limits;
   if (moved && config_.denoise)
@@ -286,17 +193,8 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   if (moved && config_.view_layers) views_.keep_motion(gbuffer_);
   report_.times.resolve_s += layering.seconds();
 
-  const Stopwatch accumulating;
-  if (!config_.denoise) {
-    if (moved) raw_mean_.clear();
-    raw_mean_.add(raw_);
-  } else if (still_jitter) {
-    layers_.write_guides(gbuffer_, guides_);
-    denoiser_.add_frame(guides_, raw_, HistorySource::kPixel);
-  } else {
-    denoiser_.add_frame(shaded, raw_, moved ? HistorySource::kMotion : HistorySource::kUnchanged);
-  }
-  report_.times.denoise_s += accumulating.seconds();
+  if (passing) (quarter ? half_.gbuffer : gbuffer_).forget_points();
+  accumulate(shaded);
   camera_ = camera;
   view_.emplace(camera, config_.traced_size());
   ++next_number_;
@@ -313,6 +211,7 @@ std::span<const float> FrameLoop::accumulated_ao(std::vector<float>& raw_mean, P
   }
   const DenoisedAo& denoised = denoiser_.denoise(config_.view_layers);
   denoised_ = &denoised;
+  if (report_.moved && expects_movement_) denoiser_.free_spare_memory();
   report.times.denoise_s += denoising.seconds();
   report.mean_history = mean_history(denoised);
   return denoised.ao;
@@ -370,7 +269,7 @@ void FrameLoop::show_layers(const FrameConfig& config) {
 
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   PassTimes& times = report.times;
-  require_channels();
+  require_surfaces(false);
   read_samples();
   std::vector<float> raw_mean;
   const std::span<const float> ao = accumulated_ao(raw_mean, report);

@@ -41,6 +41,10 @@ public:
   /// continues.
   const FrameReport& next_frame(const Camera& camera, double time_s, Progress& progress);
 
+  /// Whether the next frames are expected to move, too. Then what only a still picture needs is not kept from one to
+  /// the next: less memory, and the same results. A frame that does not move takes longer if one was expected to.
+  void expect_movement(bool expected) { expects_movement_ = expected; }
+
   /// Writes the layers of the frames so far.
   /// Throws Error(kUnsupported) for FrameConfig::cost_layers without the packed tracer.
   /// @param report mean_history is set, and the denoiser's and the resolve's times are added
@@ -92,10 +96,13 @@ public:
 private:
   void trace_camera_rays(const PrimaryCamera& view, Progress& progress);
   void trace_still(const Camera& camera, uint32_t frames, bool plans);
-  void require_channels();
+  void require_surfaces(bool points);
+  const GBuffer& shaded_surfaces() const;
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
   bool traces(uint32_t still_frame) const;
+  float footprint_px() const;
   SamplePlan sample_plan(const GBuffer& shaded, std::span<const float> limits);
+  void accumulate(const GBuffer& shaded);
   void add_lod_layers(const PrimaryCamera& view);
   void shade_frame(bool changed, Progress& progress);
   void resolve_shading(std::span<const float> ao, RenderedImage& image);
@@ -112,6 +119,7 @@ private:
   uint64_t next_number_ = 0;
   uint32_t still_frames_ = 0; ///< frames since something moved, without the first
   uint32_t channels_ = 0;     ///< of the G-buffers since something moved
+  bool expects_movement_ = false;
   GBuffer gbuffer_, guides_;
   HalfGBuffer half_;
   AoFrame raw_;

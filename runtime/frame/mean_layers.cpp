@@ -74,10 +74,10 @@ void MeanLayers::add(const GBuffer& g, std::span<const Material> materials) {
   pixel_spread_ = g.pixel_spread;
   if (frames_ == 1) {
     kept_ = false;
-    albedo_kept_ = !g.albedo.empty() && !g.material.empty();
     size_ = g.size;
     materials_ = materials;
     emitters_exist_ = std::ranges::any_of(materials, emits);
+    albedo_kept_ = !g.albedo.empty() && (!emitters_exist_ || !g.material.empty());
     return;
   }
   assert(kept_ && (!albedo_kept_ || !g.albedo.empty()));

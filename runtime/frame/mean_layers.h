@@ -61,11 +61,11 @@ private:
   bool emitters_exist_ = false;
   ImageSize size_;
   uint32_t frames_ = 0;
-  float pixel_spread_ = 0.0f; ///< of the frames
-  std::vector<float> hits_;   ///< number of frames in which the pixel's camera ray hit
-  std::vector<float> depth_;  ///< sums over hits
+  float pixel_spread_ = 0.0f;         ///< of the frames
+  std::vector<float> hits_;           ///< number of frames in which the pixel's camera ray hit
+  std::vector<float> depth_;          ///< sums over hits
   std::vector<Vec3> normal_, albedo_; ///< albedo_ is empty without albedo
-  std::vector<uint32_t> instance_; ///< of the first hit
+  std::vector<uint32_t> instance_;    ///< of the first hit
   // Empty if no material emits light, and without albedo.
   std::vector<float> emitters_;      ///< number of hits on emitters
   std::vector<Vec3> emitter_albedo_; ///< part of albedo_ that belongs to emitters

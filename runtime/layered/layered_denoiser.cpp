@@ -66,7 +66,6 @@ void LayeredDenoiser::add_to_history() {
   GBuffer& g = picture.gbuffer;
   std::ranges::fill(g.motion_px, Vec2(0));
   g.previous_z.clear();
-  if (g.albedo.empty()) g.albedo.assign(g.size.pixels(), Vec3(0)); // MeanLayers adds it up
   means_.add(g, {});
   means_.keep(g);
   if (result_->start != HistoryStart::kContinued) {

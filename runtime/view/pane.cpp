@@ -78,8 +78,9 @@ bool PaneRenderer::configure(const FrameConfig& config) {
 
 void PaneRenderer::restart() { loop_->reset(); }
 
-void PaneRenderer::next_frame(const Camera& camera, double time_s, Progress& progress) {
+void PaneRenderer::next_frame(const Camera& camera, double time_s, bool passing, Progress& progress) {
   report_ = {};
+  loop_->expect_movement(passing);
   report_.add(loop_->next_frame(camera, time_s, progress));
 }
 

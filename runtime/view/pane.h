@@ -51,7 +51,8 @@ public:
   void restart();
 
   /// Renders a frame. Throws like FrameLoop::next_frame().
-  void next_frame(const Camera& camera, double time_s, Progress& progress);
+  /// @param passing the next frame does not continue its still picture: FrameLoop::expect_movement()
+  void next_frame(const Camera& camera, double time_s, bool passing, Progress& progress);
   /// Writes image() from the frames so far, with the layers of the configuration.
   void resolve();
   /// Computes the layers of FrameConfig::plain_layers that resolve() skipped, because nothing showed them.

@@ -240,7 +240,7 @@ bool ViewSession::step(Progress& progress) {
       PaneRenderer& renderer = *renderers_[i];
       if (i > 0 && renderers_[i] == first) continue;
       if (!moving && restart_) renderer.restart();
-      renderer.next_frame(camera_in(panes_[i].file), last_.time_s, progress);
+      renderer.next_frame(camera_in(panes_[i].file), last_.time_s, moving || once_, progress);
       add_report(renderer.report(), last_.report);
     }
   } catch (const Error& error) {
@@ -253,6 +253,14 @@ bool ViewSession::step(Progress& progress) {
   if (!moving) ++still_frames_;
   last_.still_frames = still_frames_;
   return true;
+}
+
+bool ViewSession::step_once(Progress& progress) {
+  once_ = true;
+  const bool finished = step(progress);
+  once_ = false;
+  restart();
+  return finished;
 }
 
 void ViewSession::resolve() {

@@ -134,6 +134,8 @@ public:
   /// Renders the next frame of all panes that are shown. Returns false if the observer of the progress ended it by
   /// Error(kCancelled); the still picture then begins again. Throws like FrameLoop::next_frame(), and MemoryError.
   bool step(Progress& progress);
+  /// Does the same for a still picture of one frame: the next one begins anew. This takes less memory.
+  bool step_once(Progress& progress);
   /// Renders a frame if something has changed since the last one, so that the picture shows it. Returns like step().
   bool settle(Progress& progress) { return moved_ || changed_ || last_.report.frames == 0 ? step(progress) : true; }
   const ViewFrame& last() const { return last_; }
@@ -190,6 +192,7 @@ private:
   std::vector<HandMoves> hand_moves_; ///< by file
   std::optional<Selection> selection_;
   bool keep_views_ = false;
+  bool once_ = false;  ///< the frame is that of step_once()
   bool moved_ = false; ///< since the last frame
   uint32_t still_frames_ = 0;
   bool restart_ = true;   ///< the next still frame is the first

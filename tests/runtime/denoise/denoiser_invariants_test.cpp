@@ -57,6 +57,26 @@ TEST_P(DenoiserInvariants, FlatsConvergeAndKeepTheirMean) {
   }
 }
 
+TEST_P(DenoiserInvariants, SpareMemoryHoldsNothing) {
+  AoDenoiser freed(config());
+  GBuffer g = wall(kSize);
+  for (uint32_t f = 0; f < 12; ++f) {
+    const HistorySource source = f % 4 == 0   ? HistorySource::kMotion
+                                 : f % 4 == 1 ? HistorySource::kUnchanged
+                                              : HistorySource::kPixel;
+    std::ranges::fill(g.motion_px, f % 4 == 0 ? Vec2(1.25f, -0.5f) : Vec2(0));
+    const AoFrame frame = noise(kSize, 0.5f, f);
+    denoiser_.add_frame(g, frame, source), freed.add_frame(g, frame, source);
+    if (f % 8 == 0) {
+      const size_t kept = freed.state_bytes();
+      freed.free_spare_memory();
+      EXPECT_EQ(freed.state_bytes() < kept, ours());
+    }
+    EXPECT_EQ(freed.denoise().ao, denoiser_.denoise().ao) << f;
+    freed.free_spare_memory();
+  }
+}
+
 TEST_P(DenoiserInvariants, ConvergedFlatsDoNotFlicker) {
   std::vector<double> sum(kInvariantSize.pixels()), squares(kInvariantSize.pixels());
   for (uint32_t f = 0; f < 96; ++f) {

@@ -70,6 +70,50 @@ TEST(FrameLoop, LayersThatNoOneLooksAtTakeNoMemory) {
   EXPECT_EQ(image.normal.capacity() + image.shaded.capacity() + image.instance.capacity(), 0u);
 }
 
+TEST(FrameLoop, CameraRaysAreTracedAgainForLayersThatNoOneWantedBefore) {
+  const FrameBench bench;
+  FrameConfig few = bench.config_;
+  few.all_channels = false, few.plain_layers = 0;
+  Progress progress;
+  for (const uint32_t frames : {1u, 2u, 5u}) {
+    FrameLoop loop(bench.frame_scene(), few);
+    RenderedImage image;
+    render_still(loop, FrameBench::camera(), 0.0, frames, false, image, progress);
+    const GBuffer& g = loop.gbuffer();
+    EXPECT_EQ(g.albedo.capacity() + g.material.capacity() + g.triangle.capacity() + g.back_face.capacity(), 0u);
+    FrameConfig all = few;
+    all.plain_layers = kAllPlainLayers;
+    loop.show_layers(all);
+    PictureReport report;
+    loop.resolve(image, report);
+    expect_equal_images(image, bench.still(bench.config_, frames));
+    render_picture(loop, FrameBench::camera(), 0.0, 4, image, progress);
+    expect_equal_images(image, bench.still(bench.config_, frames + 4));
+  }
+}
+
+TEST(FrameLoop, ExpectedMovementTakesLessMemoryAndChangesNoResult) {
+  const FrameBench bench;
+  FrameConfig quarter = bench.config_, plain = bench.config_;
+  quarter.ao_resolution = AoResolution::kQuarter, plain.jitter = false;
+  for (const FrameConfig& config : {bench.config_, quarter, plain}) {
+    FrameLoop kept(bench.frame_scene(), config), passing(bench.frame_scene(), config);
+    passing.expect_movement(true);
+    Progress progress;
+    for (const double x : {0.5, 0.6, 0.6, 0.6, 0.6, 0.7, 0.8, 0.8}) { // moves, stands still, and moves again
+      RenderedImage expected, image;
+      PictureReport report;
+      kept.next_frame(FrameBench::camera(x), 0.0, progress), kept.resolve(expected, report);
+      const bool moved = passing.next_frame(FrameBench::camera(x), 0.0, progress).moved;
+      passing.resolve(image, report);
+      expect_equal_images(image, expected);
+      if (!moved) continue;
+      EXPECT_EQ(passing.gbuffer().has_points(), config.ao_resolution == AoResolution::kQuarter) << "for upsampling";
+      EXPECT_LT(passing.denoiser().state_bytes(), kept.denoiser().state_bytes());
+    }
+  }
+}
+
 TEST(FrameLoop, JitteredStillsConvergeToSupersampledOnes) {
   const FrameBench bench;
   FrameConfig reference = bench.config_;

@@ -33,9 +33,10 @@ GBuffer trace(const Scene& scene, const Camera& camera, ImageSize size, EmbreeCo
   return trace(scene, primary, primary, config);
 }
 
-template <typename T>
-bool same_bytes(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+template <typename Array>
+  requires requires(const Array& array) { array.data(); }
+bool same_bytes(const Array& a, const Array& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(*a.data())) == 0;
 }
 
 bool same_bytes(const GBuffer& a, const GBuffer& b) {
@@ -85,6 +86,53 @@ TEST(PrimaryVisibility, MissesAreClean) {
   GBuffer empty;
   empty.resize({8, 8});
   EXPECT_TRUE(same_bytes(g, empty));
+}
+
+TEST(PrimaryVisibility, APixelTracedAloneHitsTheSame) {
+  Scene scene = wall_scene(0, 3);
+  add_shape(scene, test::sphere(Vec3(0, 0, 3), 1.0f, 24));
+  const PrimaryCamera camera(camera_at({0, 0, 0}, {0, 0, 1}, 90), {77, 45}); // tiles are cut off
+  const FloatSource source(scene);
+  const EmbreeTracer embree(source, {});
+  GBuffer g;
+  Progress progress;
+  trace_primary(source, embree, camera, camera, g, progress);
+  uint32_t misses = 0;
+  for (uint32_t y = 0; y < 45; ++y)
+    for (uint32_t x = 0; x < 77; ++x) {
+      const size_t at = size_t{y} * 77 + x;
+      const std::optional<CameraHit> hit = trace_pixel(source, embree, camera, x, y);
+      ASSERT_EQ(hit.has_value(), g.instance[at] != kNoInstance) << x << ' ' << y;
+      misses += hit ? 0 : 1;
+      if (!hit) continue;
+      EXPECT_EQ(hit->position, g.position[at]);
+      EXPECT_EQ(hit->instance, g.instance[at]);
+      EXPECT_EQ(hit->triangle, g.triangle[at]);
+      EXPECT_EQ(hit->material, g.material[at]);
+      EXPECT_EQ(hit->back_face, g.back_face[at] != 0);
+    }
+  EXPECT_GT(misses, 100u);
+  EXPECT_LT(misses, 77u * 45u - 100u);
+}
+
+TEST(PrimaryVisibility, ChannelsThatAreNotKeptTakeNoMemory) {
+  const Scene scene = wall_scene();
+  const FloatSource source(scene);
+  const EmbreeTracer embree(source, {});
+  const PrimaryCamera camera(camera_at({0, 0, 0}, {0, 0, 1}, 90), {37, 21});
+  Progress progress;
+  GBuffer all, g;
+  trace_primary(source, embree, camera, camera, all, progress);
+  for (const uint32_t kept : {uint32_t{kAllChannels}, uint32_t{kMaterialChannel}, 0u, uint32_t{kAllChannels}}) {
+    g.keep_channels(kept);
+    trace_primary(source, embree, camera, camera, g, progress);
+    EXPECT_EQ(g.albedo.capacity() != 0, (kept & kAlbedoChannel) != 0);
+    EXPECT_EQ(g.triangle.capacity() != 0, (kept & kTriangleChannel) != 0);
+    EXPECT_EQ(g.material.capacity() != 0, (kept & kMaterialChannel) != 0);
+    EXPECT_EQ(g.back_face.capacity() != 0, (kept & kBackFaceChannel) != 0);
+    EXPECT_EQ(same_bytes(g, all), kept == kAllChannels);
+    EXPECT_TRUE(same_bytes(g.position, all.position));
+  }
 }
 
 TEST(PrimaryVisibility, EmptyScenesMissEverywhere) {
