@@ -58,6 +58,7 @@ public:
   /// Computes the layers of FrameConfig::plain_layers that resolve() skipped, because nothing showed them.
   void complete();
 
+  /// Of the last resolve(); empty after a passing frame until the next one.
   const RenderedImage& image() const { return image_; }
   const FrameLoop& loop() const { return *loop_; }
   /// Of the last frame and resolve().
