@@ -59,13 +59,13 @@ TEST_P(DenoiserInvariants, FlatsConvergeAndKeepTheirMean) {
 
 TEST_P(DenoiserInvariants, SpareMemoryHoldsNothing) {
   AoDenoiser freed(config());
-  GBuffer g = wall(kSize);
+  GBuffer g = wall(kInvariantSize);
   for (uint32_t f = 0; f < 12; ++f) {
     const HistorySource source = f % 4 == 0   ? HistorySource::kMotion
                                  : f % 4 == 1 ? HistorySource::kUnchanged
                                               : HistorySource::kPixel;
     std::ranges::fill(g.motion_px, f % 4 == 0 ? Vec2(1.25f, -0.5f) : Vec2(0));
-    const AoFrame frame = noise(kSize, 0.5f, f);
+    const AoFrame frame = noise(kInvariantSize, 0.5f, f);
     denoiser_.add_frame(g, frame, source), freed.add_frame(g, frame, source);
     if (f % 8 == 0) {
       const size_t kept = freed.state_bytes();
