@@ -73,6 +73,46 @@ TEST(Overlay, BoundsTrianglesThatStickOutOverBorders) {
   EXPECT_GT(beyond, 500u);
 }
 
+TEST(Overlay, UsesOnlyPiecesThatAreNearEnough) {
+  Surface layers = bumpy_square(7, 5.0f, 3);
+  const auto near_count = static_cast<uint32_t>(layers.triangles.size());
+  for (const LodTriangle& t : bumpy_square(7, 5.0f, 15).triangles) // a second layer, far above
+    layers.triangles.push_back({t.points + static_cast<uint32_t>(layers.points.size()), t.wedges, 0, 0.0});
+  for (DVec3 p : bumpy_square(7, 5.0f, 15).points) layers.points.emplace_back(p.x, p.y, p.z + 60.0);
+  const Surface fine = bumpy_square(11, 5.0f, 4);
+  Random random(16);
+  Overlay overlay(layers.view());
+  size_t found = 0, rejected = 0;
+  for (size_t repeat = 0; repeat < 20; ++repeat) {
+    std::vector<uint32_t> some = layers.all();
+    std::erase_if(some, [&](uint32_t) { return random.uniform(0, 1) < 0.2f; });
+    const double limit = random.uniform(3, 12);
+    for (size_t t = 0; t < fine.triangles.size(); ++t) {
+      const std::array<DVec3, 3> p = fine.corners(t);
+      std::vector<OverlayPiece> pieces, near;
+      overlay.overlay(p, DVec3(0, 0, 1), some, pieces);
+      if (!overlay.overlay_near([&](uint32_t, double distance) { return distance <= limit; }, near)) {
+        ++rejected;
+        EXPECT_TRUE(near.empty());
+        continue;
+      }
+      ++found;
+      for (int i = 0; i <= 10; ++i)
+        for (int k = 0; k <= 10 - i; ++k) {
+          const DVec3 q = p[0] + 0.1 * i * (p[1] - p[0]) + 0.1 * k * (p[2] - p[0]);
+          double distance = 1e300;
+          for (const OverlayPiece& piece : near) {
+            EXPECT_LT(piece.triangle, near_count);
+            distance = std::min(distance, layers.view().distance(q, piece.triangle));
+          }
+          ASSERT_LE(distance, limit + 1e-9) << "triangle " << t;
+        }
+    }
+  }
+  EXPECT_GT(found, 500u);
+  EXPECT_GT(rejected, 500u);
+}
+
 TEST(Overlay, ACoincidingTriangleIsOnePiece) {
   const Surface s = bumpy_square(5, 5.0f, 5);
   const std::vector<uint32_t> all = s.all();

@@ -260,16 +260,23 @@ private:
     overlay_.clear();
     work_ += simplified_.candidates().size();
     const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-    if (!simplified_.overlay(triangle, normal, overlay_) && !simplified_.overlay().overlay_over_borders(overlay_))
-      return;
+    Overlay& over = simplified_.overlay();
+    if (!simplified_.overlay(triangle, normal, overlay_) && !over.overlay_over_borders(overlay_)) return;
     double largest = 0.0;
-    tried_.clear();
     for (OverlayPiece& piece : overlay_) {
-      if (piece.distance > enough) piece.distance = simplified_.overlay().nearest_distance(piece);
+      if (piece.distance > enough) piece.distance = over.nearest_distance(piece);
       largest = std::max(largest, piece.distance);
-      tried_.emplace_back(piece.triangle, piece.distance);
     }
-    if (largest < best) std::swap(best_, tried_), best = largest;
+    near_.clear();
+    if (largest > enough && over.overlay_near([&](uint32_t, double d) { return d <= enough; }, near_)) {
+      std::swap(overlay_, near_);
+      largest = 0.0;
+      for (const OverlayPiece& piece : overlay_) largest = std::max(largest, piece.distance);
+    }
+    if (largest >= best) return;
+    best = largest;
+    best_.clear();
+    for (const OverlayPiece& piece : overlay_) best_.emplace_back(piece.triangle, piece.distance);
   }
 
   /// Bounds by subdivision; replaces best_ and `best` if that bound is smaller.
@@ -299,8 +306,36 @@ private:
     return bound;
   }
 
-  /// Bounds a simplified triangle by subdivision against the triangles in numbers_.
+  /// Whether an overlay shows that a simplified triangle is within largest_ of the triangles in numbers_.
+  /// @param bound set to its error bound if so
+  bool is_near_lower(const Corners& corners, double& bound) {
+    lower_positions_.clear(), lower_points_.clear(), lower_triangles_.clear(), lower_candidates_.clear();
+    for (uint32_t i = 0; i < numbers_.size(); ++i) {
+      LodTriangle t{};
+      for (int corner = 0; corner < 3; ++corner) {
+        const uint32_t vertex = in_.levels.triangles[numbers_[i]][corner];
+        t.points[corner] = lower_positions_(in_.levels.vertices[vertex].position);
+        if (t.points[corner] == lower_points_.size()) lower_points_.push_back(point(vertex));
+      }
+      lower_triangles_.push_back(t), lower_candidates_.push_back(i);
+    }
+    work_ += numbers_.size();
+    lower_.reset({lower_points_, lower_triangles_});
+    overlay_.clear(), near_.clear();
+    const auto stated = [&](uint32_t i, double distance) {
+      return stated_error(distance, in_.levels.errors[numbers_[i]]);
+    };
+    lower_.overlay(corners, glm::cross(corners[1] - corners[0], corners[2] - corners[0]), lower_candidates_, overlay_);
+    if (!lower_.overlay_near([&](uint32_t i, double distance) { return stated(i, distance) <= largest_; }, near_))
+      return false;
+    bound = 0.0;
+    for (const OverlayPiece& piece : near_) bound = std::max(bound, stated(piece.triangle, piece.distance));
+    return true;
+  }
+
+  /// Bounds a simplified triangle by an overlay on the triangles in numbers_ or by subdivision.
   double measure_against_lower(const Corners& corners) {
+    if (double bound = 0.0; is_near_lower(corners, bound)) return bound;
     TriangleSet& below = refiner_.begin();
     for (const uint32_t number : numbers_) below.add(corners_of(number), number);
     const auto stated = [&](double distance, uint32_t number) {
@@ -326,7 +361,12 @@ private:
   TriangleSet set_;               ///< simplified triangles near the current source triangle
   Renumbering vertices_{512};     ///< lower-level vertices with known distances_
   std::vector<double> distances_; ///< set_.padded_size() entries per vertex
-  std::vector<OverlayPiece> overlay_;
+  std::vector<OverlayPiece> overlay_, near_;
+  Overlay lower_; ///< on the lower-level triangles in numbers_, numbered by their place there
+  Renumbering lower_positions_{512};
+  std::vector<DVec3> lower_points_;
+  std::vector<LodTriangle> lower_triangles_;
+  std::vector<uint32_t> lower_candidates_;
   std::vector<std::pair<uint32_t, double>> best_, tried_;
   TriangleRefiner refiner_;
   size_t work_ = 0; ///< distances and triangles looked at, except those of refiner_

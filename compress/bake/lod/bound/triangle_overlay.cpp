@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSteep = 0.05;               // cosine; steeper triangles count as edge-on
 constexpr double kRounding = 1e-6;            // tolerance of the coverage, which is an integer
-constexpr double kLeastCoverage = 1e-3;       // of triangles that stick out over borders
+constexpr double kLeastCoverage = 1e-3;       // by the largest piece, of triangles that stick out over borders
 constexpr double kFullCoverage = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
 static_assert(sizeof(DVec3) == 3 * sizeof(double));
 
@@ -64,9 +64,8 @@ double OverlaySurface::distance(DVec3 p, uint32_t triangle) const {
 Overlay::Overlay(const OverlaySurface& surface) : surface_(surface) {}
 
 void Overlay::prepare() {
-  projected_.resize(surface_.points.size());
-  outside_.resize(surface_.points.size());
-  stamps_.resize(surface_.points.size());
+  if (const size_t count = surface_.points.size(); count > stamps_.size())
+    projected_.resize(count), outside_.resize(count), stamps_.resize(count);
   corners_.reserve(3 * surface_.triangles.size());
   for (const LodTriangle& t : surface_.triangles)
     for (int i = 0; i < 3; ++i) corners_.push_back(t.points[i]);
@@ -104,24 +103,20 @@ bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std
   task_.enough = kFullCoverage;
   OverlayCover cover{};
   const auto find = [&] {
-    return kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &cover);
+    found_count_ = kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &cover);
+    largest_piece_ = cover.largest;
   };
-  uint32_t count = find();
-  if (cover.count < 1.0 - kRounding) {
-    if (cover.count > kLeastCoverage) found_count_ = count, largest_piece_ = cover.largest;
-    return false;
-  }
-  bool together = has_no_open_sides(std::span(found_).first(count));
-  if (!together) {
-    if (cover.count >= kFullCoverage) {
-      task_.enough = std::numeric_limits<double>::infinity();
-      count = find();
-      together = has_no_open_sides(std::span(found_).first(count));
-    }
-    if (!together) found_count_ = count, largest_piece_ = cover.largest;
+  const auto no_open_sides = [&] { return has_no_open_sides(std::span(found_).first(found_count_)); };
+  find();
+  if (cover.count < 1.0 - kRounding) return false;
+  bool together = no_open_sides();
+  if (!together && cover.count >= kFullCoverage) {
+    task_.enough = std::numeric_limits<double>::infinity();
+    find();
+    together = no_open_sides();
   }
   if (!together || std::abs(cover.count - std::round(cover.count)) > kRounding) return false;
-  pieces.insert(pieces.end(), found_.begin(), found_.begin() + count);
+  pieces.insert(pieces.end(), found_.begin(), found_.begin() + found_count_);
   return true;
 }
 
@@ -143,18 +138,6 @@ bool Overlay::has_no_open_sides(std::span<const OverlayPiece> pieces) {
   return open_sides_.empty();
 }
 
-bool Overlay::overlay_over_borders(std::vector<OverlayPiece>& pieces) {
-  if (found_count_ == 0) return false;
-  const std::span<const OverlayPiece> found = std::span(found_).first(found_count_);
-  has_no_open_sides(found); // sets open_sides_
-  const OverlayPoint covered = point_in(found[largest_piece_]);
-  pieces.insert(pieces.end(), found.begin(), found.end());
-  for (const OpenSide& side : open_sides_)
-    if (const double distance = distance_beyond(side, covered); distance >= 0.0)
-      pieces.push_back({side.triangle, OverlayPiece::kBeyondSide, distance});
-  return true;
-}
-
 OverlayPolygon Overlay::overlap(const OverlayPiece& piece) const {
   const uint32_t* points = &corners_[size_t{3} * piece.triangle];
   OverlayPolygon polygon{{projected_[points[0]], projected_[points[1]], projected_[points[2]]}, 3};
@@ -162,14 +145,17 @@ OverlayPolygon Overlay::overlap(const OverlayPiece& piece) const {
   return polygon;
 }
 
-/// The centroid of a piece's corners.
-OverlayPoint Overlay::point_in(const OverlayPiece& piece) const {
+/// Finds the centroid of a piece's corners. Returns false if the piece is so small that rounding could move it out.
+bool Overlay::find_point_in(const OverlayPiece& piece, OverlayPoint& out) const {
   const OverlayPolygon polygon = overlap(piece);
   const double share = 1.0 / static_cast<double>(std::max<size_t>(polygon.count, 1));
-  OverlayPoint result{};
-  for (size_t i = 0; i < polygon.count; ++i)
-    result.l1 += share * polygon.corners[i].l1, result.l2 += share * polygon.corners[i].l2;
-  return result;
+  double area = 0.0;
+  for (size_t i = 0; i < polygon.count; ++i) {
+    const OverlayPoint &p = polygon.corners[i], &q = polygon.corners[i + 1 == polygon.count ? 0 : i + 1];
+    out.l1 += share * p.l1, out.l2 += share * p.l2;
+    area += p.l1 * q.l2 - p.l2 * q.l1;
+  }
+  return area > kLeastCoverage;
 }
 
 /// The largest distance, from an open side's candidate, of the overlaid triangle's part that is beyond the side as seen

@@ -32,7 +32,9 @@ struct OverlayPolygon {
 /// maximum over a piece is at a corner. The same holds for nearest points, as the distance from a triangle is convex.
 class Overlay {
 public:
-  explicit Overlay(const OverlaySurface& surface);
+  explicit Overlay(const OverlaySurface& surface = {});
+  /// Continues with another surface and keeps the memory.
+  void reset(const OverlaySurface& surface) { surface_ = surface, corners_.clear(); }
 
   /// Appends the pieces to `pieces` and returns true if the candidates are known to cover the triangle: each candidate
   /// side through its interior is shared by two candidates, so they cover all of it equally often, and their areas say
@@ -41,12 +43,41 @@ public:
   bool overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
                std::vector<OverlayPiece>& pieces);
 
-  /// After overlay() returned false: bounds a triangle that sticks out over borders of the candidates, as where borders
-  /// moved. A segment from a point that no candidate covers to a covered point enters the candidates through an open
-  /// side, so what lies beyond the open sides, as seen from one covered point, is all that is not covered. Each of
-  /// these parts is measured to its side's candidate and appended as a further piece. Returns false, and leaves
-  /// `pieces` unchanged, if the candidates cover hardly any of the triangle.
-  bool overlay_over_borders(std::vector<OverlayPiece>& pieces);
+  /// Bounds the triangle of the last overlay() even where no candidate covers it, as where borders moved, using only
+  /// pieces that are near enough. A segment from a point that none of these covers to a covered point enters them
+  /// through an open side, so what lies beyond the open sides, as seen from one covered point, is all that they do not
+  /// cover. Each of these parts is measured to its side's candidate and appended as a further piece. Returns false, and
+  /// leaves `pieces` unchanged, if a part is too far away or hardly anything is covered.
+  /// @param accept (candidate, distance): whether that distance is near enough
+  template <typename Accept>
+  bool overlay_near(const Accept& accept, std::vector<OverlayPiece>& pieces) {
+    near_.clear();
+    size_t largest = 0; // index in near_
+    for (uint32_t i = 0; i < found_count_; ++i) {
+      OverlayPiece piece = found_[i];
+      if (!accept(piece.triangle, piece.distance)) {
+        piece.distance = nearest_distance(piece);
+        if (!accept(piece.triangle, piece.distance)) continue;
+      }
+      if (i == largest_piece_) largest = near_.size();
+      near_.push_back(piece);
+    }
+    OverlayPoint covered{};
+    if (near_.empty() || !find_point_in(near_[largest], covered)) return false;
+    has_no_open_sides(near_); // sets open_sides_
+    for (const OpenSide& side : open_sides_) {
+      const double distance = distance_beyond(side, covered);
+      if (distance < 0.0) continue;
+      if (!accept(side.triangle, distance)) return false;
+      near_.push_back({side.triangle, OverlayPiece::kBeyondSide, distance});
+    }
+    pieces.insert(pieces.end(), near_.begin(), near_.end());
+    return true;
+  }
+  /// The same with all pieces, whatever their distances.
+  bool overlay_over_borders(std::vector<OverlayPiece>& pieces) {
+    return overlay_near([](uint32_t, double) { return true; }, pieces);
+  }
 
   /// The maximum distance of a piece of the last overlay() to nearest points; at most the distance along the direction.
   double nearest_distance(const OverlayPiece& piece) const;
@@ -60,7 +91,7 @@ private:
   void prepare(); ///< on first use, as most overlays are never needed
   bool has_no_open_sides(std::span<const OverlayPiece> pieces);
   OverlayPolygon overlap(const OverlayPiece& piece) const;
-  OverlayPoint point_in(const OverlayPiece& piece) const;
+  bool find_point_in(const OverlayPiece& piece, OverlayPoint& out) const;
   double distance_beyond(const OpenSide& side, const OverlayPoint& covered) const;
 
   OverlaySurface surface_;
@@ -68,9 +99,9 @@ private:
   std::vector<OverlayPoint> projected_;
   std::vector<uint32_t> outside_, stamps_;
   std::vector<OverlayPiece> found_; ///< output of the kernel
+  uint32_t found_count_ = 0, largest_piece_ = 0;
+  std::vector<OverlayPiece> near_; ///< those of found_ that are near enough, then what lies beyond their open sides
   std::vector<OpenSide> open_sides_;
-  uint32_t found_count_ = 0; ///< pieces in found_, if they cover only a part of the triangle
-  uint32_t largest_piece_ = 0;
   OverlayTask task_{};
   std::array<DVec3, 3> triangle_{};
   DVec3 direction_{};

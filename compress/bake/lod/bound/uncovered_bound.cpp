@@ -80,7 +80,7 @@ double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, doubl
 /// enough
 double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, double& least) {
   double by_overlay = kInfinite;
-  if (overlay(part, by_overlay) && by_overlay <= error_.limit()) {
+  if (overlay(part, by_overlay) && (by_overlay <= error_.limit() || overlay_near(by_overlay))) {
     for (const OverlayPiece& piece : mapped_triangles_) parts_.push_back({triangle, piece.triangle, piece.distance});
     return by_overlay;
   }
@@ -104,6 +104,20 @@ bool UncoveredBound::overlay(const Corners& part, double& stated) {
     if (!error_.enough(piece.distance, inherited)) piece.distance = source_.overlay().nearest_distance(piece);
     stated = std::max(stated, stated_error(piece.distance, inherited));
   }
+  return true;
+}
+
+/// Replaces mapped_triangles_ by pieces that are all near enough. Returns false, and changes nothing, if these do not
+/// bound the part.
+bool UncoveredBound::overlay_near(double& stated) {
+  refined_.clear();
+  if (!source_.overlay().overlay_near(
+          [&](uint32_t t, double distance) { return error_.enough(distance, inherited(t)); }, refined_))
+    return false;
+  std::swap(mapped_triangles_, refined_);
+  stated = 0.0;
+  for (const OverlayPiece& piece : mapped_triangles_)
+    stated = std::max(stated, stated_error(piece.distance, inherited(piece.triangle)));
   return true;
 }
 

@@ -46,6 +46,7 @@ private:
 
   double inherited(uint32_t source) const { return source_.surface().triangles[source].error; }
   bool overlay(const Corners& part, double& stated);
+  bool overlay_near(double& stated);
   double refine();
   double measure_part(uint32_t triangle, const Corners& part, double& least);
   double look_closer(uint32_t triangle, const Corners& part, double known, uint32_t depth);
