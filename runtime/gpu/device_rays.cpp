@@ -1,6 +1,7 @@
 #include "runtime/gpu/device_rays.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <functional>
 #include <utility>
@@ -60,6 +61,7 @@ struct DeviceRays::State {
   std::shared_ptr<Device> device;
   CameraRecord camera{};
   Buffer cameras, hits, rays, counts, sums;
+  Buffer spare_counts; ///< of dispatches that only measure
   StagedBuffer points, view, film;
   uint32_t point_count = 0;
   std::unique_ptr<Kernel> camera_kernel, view_kernel, points_kernel, rays_kernel, nearest_kernel;
@@ -80,6 +82,16 @@ struct DeviceRays::State {
     if (points.bytes() >= bytes && points.bytes() > 0) return;
     points = StagedBuffer();
     with_slack(bytes, [&](uint64_t all) { points = StagedBuffer(device, all, "points"); });
+  }
+  /// Returns false if there is no memory for them.
+  bool make_spare_counts() {
+    try {
+      make_room(spare_counts, counts.bytes(), "counts");
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
+      return false;
+    }
+    return true;
   }
   uint64_t most_threads() const { return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * kThreads; }
   bool has_queue() const;
@@ -189,7 +201,10 @@ void DeviceRays::set_points(std::span<const PointRecord> points) {
   });
 }
 
-void DeviceRays::release() { state_->points = StagedBuffer(), state_->counts = Buffer(), state_->sums = Buffer(); }
+void DeviceRays::release() {
+  state_->points = StagedBuffer();
+  for (Buffer* buffer : {&state_->counts, &state_->spare_counts, &state_->sums}) *buffer = Buffer();
+}
 
 /// Whether the queue kernel can count occluded rays: subgroups of 4 to 32 lanes, at most 2^24 nodes, no masks.
 bool DeviceRays::State::has_queue() const {
@@ -246,18 +261,31 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watc
   s.device->fill(s.counts, 0);
   s.make_count_kernels();
   FasterKernel& faster = s.faster[samples.order];
+  Kernel* const kernels[] = {s.walk_kernel.get(), s.queue_kernel.get()};
+  double spare_ms = 0.0; // of dispatches that only measure
   const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
     const uint64_t rays = uint64_t{part.point_count} * part.sample_count;
     const GpuCounting counting = s.device->config().counting;
-    const size_t number = !s.queue_kernel || counting == GpuCounting::kWalk ? 0
-                          : counting == GpuCounting::kQueue                 ? 1
-                                                                            : faster.next(rays);
-    const double ms = s.device->run(number == 0 ? *s.walk_kernel : *s.queue_kernel, push_bytes(part), groups);
-    faster.add(number, rays, ms);
-    return ms;
+    if (kernels[1] == nullptr || counting != GpuCounting::kFaster) {
+      Kernel* const asked = kernels[1] == nullptr || counting == GpuCounting::kWalk ? kernels[0] : kernels[1];
+      return s.device->run(*asked, push_bytes(part), groups);
+    }
+    const bool compares = faster.compares(rays) && s.make_spare_counts();
+    const size_t number = faster.choice(rays);
+    std::array<double, 2> ms{};
+    ms[number] = s.device->run(*kernels[number], push_bytes(part), groups);
+    if (!compares) return ms[number];
+    Kernel& other = *kernels[1 - number];
+    other.bind(kFirstBinding + 1, s.spare_counts);
+    ms[1 - number] = s.device->run(other, push_bytes(part), groups);
+    other.bind(kFirstBinding + 1, s.counts);
+    faster.add(rays, ms);
+    spare_ms += ms[1 - number];
+    return ms[number];
   };
   const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };
-  const DeviceTime time = s.run_all(run, samples, kMaxSamples, s.count_pace[samples.order], threads, watch);
+  DeviceTime time = s.run_all(run, samples, kMaxSamples, s.count_pace[samples.order], threads, watch);
+  time.ms += spare_ms;
   uint32_t lost = 0;
   download(s.device, s.counts, s.counts.bytes() - sizeof lost, std::as_writable_bytes(std::span(&lost, 1)));
   if (lost != 0)

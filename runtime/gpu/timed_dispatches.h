@@ -65,38 +65,31 @@ private:
   uint64_t most_;
 };
 
-/// Chooses between two kernels with the same results. Parts of a picture differ in cost and clocks change, so only
-/// dispatches that follow each other are compared. Which kernel is faster depends on how many rays a dispatch has.
+/// Chooses between two kernels with the same results. Which one is faster depends on how many rays a dispatch has.
+/// Parts of a picture differ in cost and the device's clock changes, so both are compared on the same rays, now and
+/// then.
 class FasterKernel {
 public:
-  /// Number of the kernel of the next dispatch. Both have turns at first, and the slower one now and then.
-  size_t next(uint64_t rays) {
-    Trials& trials = trials_[std::bit_width(rays)];
-    const size_t turn = trials.dispatches++;
-    if (turn < kFirstTurns) return turn % 2;
-    const size_t faster = trials.log_ratio < 0.0 ? 1 : 0;
-    const size_t turns = std::abs(trials.log_ratio) < kClose ? kTurnsIfClose : kTurns;
-    return turn % turns == 0 ? 1 - faster : faster;
+  /// Whether the next dispatch is to be run with both kernels, and their times given to add().
+  bool compares(uint64_t rays) {
+    const size_t turn = trials_[std::bit_width(rays)].dispatches++;
+    return turn == 0 || turn == kSecondTurn || turn % kTurns == 0;
   }
-  void add(size_t kernel, uint64_t rays, double ms) {
+  /// Number of the faster kernel.
+  size_t choice(uint64_t rays) const { return trials_[std::bit_width(rays)].log_ratio < 0.0 ? 1 : 0; }
+  void add(uint64_t rays, const std::array<double, 2>& ms) {
     Trials& trials = trials_[std::bit_width(rays)];
-    const double now = std::max(ms, 1e-6) / static_cast<double>(rays);
-    if (trials.last_ms_per_ray > 0.0 && kernel != trials.last_kernel) {
-      const double ratio = kernel == 1 ? now / trials.last_ms_per_ray : trials.last_ms_per_ray / now;
-      trials.log_ratio += (std::log(ratio) - trials.log_ratio) * std::max(kMinShare, 1.0 / ++trials.comparisons);
-    }
-    trials.last_kernel = kernel, trials.last_ms_per_ray = now;
+    const double log_ratio = std::log(std::max(ms[1], 1e-6) / std::max(ms[0], 1e-6));
+    trials.log_ratio += (log_ratio - trials.log_ratio) / std::min(++trials.comparisons, kMemory);
   }
 
 private:
-  static constexpr size_t kFirstTurns = 6, kTurns = 64, kTurnsIfClose = 16;
-  static constexpr double kClose = 0.2;    ///< of log_ratio
-  static constexpr double kMinShare = 0.3; ///< of a comparison in log_ratio
+  static constexpr size_t kSecondTurn = 4, kTurns = 64; ///< the first dispatches may find the clock low
+  static constexpr int kMemory = 2;                     ///< comparisons that count
 
   struct Trials {
     double log_ratio = 0.0; ///< of the time of kernel 1 to that of kernel 0
-    double last_ms_per_ray = 0.0;
-    size_t last_kernel = 0, dispatches = 0;
+    size_t dispatches = 0;
     int comparisons = 0;
   };
   std::array<Trials, 65> trials_; ///< by the number of bits of the number of rays

@@ -159,7 +159,7 @@ private:
   template <typename Work>
   static void warm_up(const Work& work) {
     const Stopwatch watch;
-    for (int times = 0; times < 3 || watch.seconds() < 0.3; ++times) work();
+    for (int times = 0; times < 3 || watch.seconds() < 1.0; ++times) work();
   }
 
   Json run_camera() {

@@ -159,20 +159,27 @@ TEST_F(DeviceRaysTest, ShortDispatchesGiveTheSameCounts) {
 
 /// The faster kernel gets nearly all turns, by the size of dispatches, and another one once that takes less time.
 TEST(FasterKernel, FollowsTheTimes) {
-  gpu::FasterKernel choice;
-  const auto turns_of_first = [&](uint64_t rays, double first_ms, double second_ms) {
-    int turns = 0;
+  gpu::FasterKernel kernels;
+  struct Turns {
+    int first = 0, both = 0;
+  };
+  const auto turns = [&](uint64_t rays, double first_ms, double second_ms) {
+    Turns turns;
     for (int i = 0; i < 640; ++i) {
-      const size_t number = choice.next(rays);
-      turns += number == 0 ? 1 : 0;
-      choice.add(number, rays, number == 0 ? first_ms : second_ms);
+      const bool both = kernels.compares(rays);
+      if (kernels.choice(rays) == 0) ++turns.first;
+      if (!both) continue;
+      kernels.add(rays, {first_ms, second_ms});
+      ++turns.both;
     }
     return turns;
   };
-  EXPECT_GT(turns_of_first(1000, 1.0, 2.0), 620);
-  EXPECT_LT(turns_of_first(1000000, 2.0, 1.0), 20);
-  EXPECT_GT(turns_of_first(1000, 1.0, 2.0), 620);
-  EXPECT_LT(turns_of_first(1000, 4.0, 2.0), 100);
+  EXPECT_EQ(turns(1000, 1.0, 2.0).first, 640);
+  EXPECT_LT(turns(1000000, 2.0, 1.0).first, 20);
+  const Turns again = turns(1000, 1.0, 2.0);
+  EXPECT_EQ(again.first, 640);
+  EXPECT_EQ(again.both, 10);
+  EXPECT_LT(turns(1000, 4.0, 1.0).first, 140);
 }
 
 /// A thread that gets no point, in a scene that rays cannot leave, must not hang.

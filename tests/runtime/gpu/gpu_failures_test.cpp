@@ -105,7 +105,7 @@ TEST_F(GpuFailuresOnDevice, OutOfMemory) {
 
 TEST_F(GpuFailuresOnDevice, BuffersThatKernelsCannotAddress) {
   const auto device = gpu::Device::open(config_);
-  const uint64_t bytes = uint64_t{device->limits().maxStorageBufferRange} + 16;
+  const uint64_t bytes = (uint64_t{device->limits().maxStorageBufferRange} / 16 + 2) * 16;
   try {
     const gpu::Buffer buffer(device, bytes, gpu::BufferPlace::kDevice, "nodes");
     FAIL() << "no error";
