@@ -71,6 +71,7 @@ set(packtrace_public_headers
   runtime/ao/sampler.h
   runtime/camera/gbuffer.h
   runtime/camera/lod_view.h
+  runtime/camera/pixel_array.h
   runtime/camera/primary_visibility.h
   runtime/denoise/denoiser.h
   runtime/denoise/denoise_pipeline.h

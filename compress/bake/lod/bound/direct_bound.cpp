@@ -22,7 +22,9 @@ constexpr double kSlack = 1.25;    // stops once the largest error left is withi
 // At most max(kFew, 1 / kMeasuredFraction of all triangles) are measured: if more have large errors, tightening them
 // gains little.
 constexpr size_t kFew = 512, kMeasuredFraction = 8;
-constexpr size_t kWork = 400; // maximum work per triangle of the group: distances and triangles looked at
+// Maximum work per triangle of the group: distances and triangles looked at. Groups of fewer than kLeastWorked
+// triangles, whose lower levels are many times as large, get as much as groups of that many.
+constexpr size_t kWork = 400, kLeastWorked = 256;
 
 /// A convex planar polygon.
 struct Polygon {
@@ -101,7 +103,10 @@ public:
 
 private:
   /// Limits the work in soups: where every triangle is near all others, more measuring gains little.
-  bool spent() const { return work_ + refiner_.work() > kWork * (in_.triangles.size() + m_.triangles.size()); }
+  bool spent() const {
+    const size_t triangles = std::max(kLeastWorked, in_.triangles.size() + m_.triangles.size());
+    return work_ + refiner_.work() > kWork * triangles;
+  }
 
   void fill_heap() {
     for (uint32_t t = 0; t < in_.triangles.size(); ++t) heap_.emplace_back(links_.bounds[t], t);
