@@ -17,10 +17,11 @@ namespace {
 constexpr uint32_t kCells = 18;      ///< 6 * 18^2 quads per rock
 constexpr double kSpacing = 5.4;     ///< metres: edge of the cube that each rock occupies on average
 constexpr double kClearAround = 2.5; ///< metres around the eye without rocks
-constexpr const char* kPaints[] = {"basalt", "slate", "clay", "ochre"};
-constexpr const char* kComment = "# Rocks of many shapes about the camera, as many as the generator is asked for.\n"
-                                 "# To be seen: dented rocks of four colours in all directions, near and far. Made by "
-                                 "packtrace_scenegen asteroids.\n\n";
+constexpr const char* kRockPaints[] = {"basalt", "slate", "clay", "ochre"};
+constexpr const char* kRocksComment =
+    "# Rocks of many shapes about the camera, as many as the generator is asked for.\n"
+    "# To be seen: dented rocks of four colours in all directions, near and far. Made by "
+    "packtrace_scenegen asteroids.\n\n";
 
 /// An elongated lump of noise with one or two dents.
 Model make_asteroid(uint64_t seed, uint64_t number) {
@@ -35,7 +36,7 @@ Model make_asteroid(uint64_t seed, uint64_t number) {
   for (Dent& dent : dents) dent = {random_direction(random), random.uniform(0.75, 0.95), random.uniform(0.05, 0.25)};
   const DVec3 shape{random.uniform(0.7, 1.3), random.uniform(0.6, 1.0), random.uniform(0.6, 1.0)};
   Model model;
-  add_blob(model.smooth(kPaints[number % std::size(kPaints)]), scaling(shape), kCells, [&](DVec3 direction) {
+  add_blob(model.smooth(kRockPaints[number % std::size(kRockPaints)]), scaling(shape), kCells, [&](DVec3 direction) {
     double radius = 1.0 + roughness * fractal_noise(direction * lumps, noise_seed, 5);
     for (const Dent& dent : dents)
       radius -= dent.depth * smooth_step(dent.cosine, 1.0, glm::dot(direction, dent.towards));
@@ -63,9 +64,9 @@ SceneTotals generate_asteroids(const AsteroidsConfig& config, const OutputConfig
                                                config.instances, config.geometries));
   }
   const ViewConfig view{{0, 0, 0}, {0.3, 0.1, 1.0}, 60.0, 960, 540};
-  SceneWriter writer(output, "asteroids", kComment, view);
+  SceneWriter writer(output, "asteroids", kRocksComment, view);
   const Vec3 albedo[] = {{0.22f, 0.22f, 0.24f}, {0.35f, 0.38f, 0.42f}, {0.55f, 0.38f, 0.28f}, {0.62f, 0.52f, 0.30f}};
-  for (size_t i = 0; i < std::size(kPaints); ++i) writer.material(kPaints[i], albedo[i]);
+  for (size_t i = 0; i < std::size(kRockPaints); ++i) writer.material(kRockPaints[i], albedo[i]);
 
   Random random(config.seed, 401'000'000);
   uint64_t side = 1;

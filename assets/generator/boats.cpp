@@ -10,8 +10,6 @@
 namespace packtrace::scenegen {
 namespace {
 
-const DAffine kHere(1.0);
-
 struct HullConfig {
   double length = 4.0;
   double half_width = 0.8;

@@ -17,7 +17,7 @@ namespace packtrace::scenegen {
 namespace {
 
 constexpr double kRingRadius = 10.0, kTubeRadius = 3.4;
-constexpr const char* kComment =
+constexpr const char* kMeshComment =
     "# One unique mesh of as many triangles as the generator was asked for: a ring of eroded rock.\n"
     "# To be seen: crevices dark, ridges light, at every scale. Made by packtrace_scenegen mesh.\n\n";
 
@@ -94,7 +94,7 @@ SceneTotals generate_displaced_mesh(const DisplacedMeshConfig& config, const Out
   if (config.triangles < 100 || config.triangles > 2'000'000'000) {
     throw Error(ErrorKind::kUsage, fmt::format("--triangles {}: a mesh takes 100 to 2000000000", config.triangles));
   }
-  SceneWriter writer(output, "mesh", kComment, {{-3.0, 13.0, -21.0}, {0.0, -1.0, -1.0}, 44.0, 1280, 720});
+  SceneWriter writer(output, "mesh", kMeshComment, {{-3.0, 13.0, -21.0}, {0.0, -1.0, -1.0}, 44.0, 1280, 720});
   writer.material("rock", {0.62f, 0.48f, 0.36f});
   writer.material("plain", {0.55f, 0.56f, 0.55f});
   Model plain;

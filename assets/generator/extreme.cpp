@@ -12,12 +12,13 @@
 namespace packtrace::scenegen {
 namespace {
 
-constexpr const char* kComment = "# Extremes of scale in one scene: a crumb of 1e-6 before a mountain of 1e6, both the "
-                                 "same mesh, on one ground of 4e6;\n"
-                                 "# a cluster 1e7 away; slabs without thickness; needles 1e7 times longer than wide.\n"
-                                 "# To be seen: crumbs resting on the ground at the left, paper-thin slabs leaning at "
-                                 "the right, the mountain on the horizon.\n"
-                                 "# Made by packtrace_scenegen extreme.\n\n";
+constexpr const char* kExtremeComment =
+    "# Extremes of scale in one scene: a crumb of 1e-6 before a mountain of 1e6, both the "
+    "same mesh, on one ground of 4e6;\n"
+    "# a cluster 1e7 away; slabs without thickness; needles 1e7 times longer than wide.\n"
+    "# To be seen: crumbs resting on the ground at the left, paper-thin slabs leaning at "
+    "the right, the mountain on the horizon.\n"
+    "# Made by packtrace_scenegen extreme.\n\n";
 
 /// A rectangle in the frame's xy plane, stored twice back to back: two coincident faces without volume.
 Model make_slab() {
@@ -52,7 +53,7 @@ Model make_needles(Random& random) {
 SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& output) {
   // Eye 2e-6 above the ground, crumbs 5e-6 ahead; lengths in units of the scene.
   const ViewConfig view{{0.0, 2.2e-6, -8e-6}, {0.2e-6, 1.6e-6, 0.0}, 45.0, 1280, 720};
-  SceneWriter writer(output, "extreme", kComment, view);
+  SceneWriter writer(output, "extreme", kExtremeComment, view);
   const std::pair<const char*, Vec3> paints[] = {{"ground", {0.55f, 0.50f, 0.42f}},
                                                  {"boulder", {0.60f, 0.36f, 0.24f}},
                                                  {"snow", {0.80f, 0.83f, 0.88f}},

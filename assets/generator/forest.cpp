@@ -17,8 +17,8 @@
 namespace packtrace::scenegen {
 namespace {
 
-constexpr double kCell = 3.6; ///< metres between neighbouring plants
-constexpr const char* kComment =
+constexpr double kPlantSpacing = 3.6; ///< metres between neighbouring plants
+constexpr const char* kForestComment =
     "# A forest of instanced trees with a path into it; its size is the generator's option.\n"
     "# To be seen: leaves against the sky, a path that darkens with depth. Made by packtrace_scenegen forest.\n\n";
 
@@ -48,7 +48,7 @@ public:
     const double wanted =
         config_.instances != 0 ? static_cast<double>(config_.instances) : static_cast<double>(config_.triangles) / each;
     const auto side = static_cast<uint64_t>(std::ceil(std::sqrt(wanted * 1.08))) + 4; // the path takes some cells
-    write_ground(static_cast<double>(side) * kCell);
+    write_ground(static_cast<double>(side) * kPlantSpacing);
     uint64_t plants = 0, triangles = 0;
     for (uint64_t row = 0;; ++row) { // until there are enough plants
       for (uint64_t column = 0; column < side; ++column) {
@@ -125,8 +125,8 @@ void ForestBuilder::write_ground(double extent) {
 
 /// Fills one cell. Returns the number of triangles placed, 0 on the path.
 uint64_t ForestBuilder::plant(uint64_t row, double column) {
-  const double x = (column + random_.uniform(-0.35, 0.35)) * kCell;
-  const double z = (static_cast<double>(row) + random_.uniform(-0.35, 0.35)) * kCell;
+  const double x = (column + random_.uniform(-0.35, 0.35)) * kPlantSpacing;
+  const double z = (static_cast<double>(row) + random_.uniform(-0.35, 0.35)) * kPlantSpacing;
   const double turn = random_.uniform(0.0, 2.0 * kPi), size = random_.uniform(0.7, 1.25);
   double pick = random_.uniform();
   if (std::abs(x - path_x(z, config_.seed)) < 2.6) return 0;
@@ -158,7 +158,7 @@ SceneTotals generate_forest(const ForestConfig& config, const OutputConfig& outp
   if (config.instances != 0 && (config.instances < 100 || config.instances > 50'000'000)) {
     throw Error(ErrorKind::kUsage, fmt::format("--instances {}: a forest takes 100 to 50000000", config.instances));
   }
-  SceneWriter writer(output, "forest", kComment, forest_view(config.seed));
+  SceneWriter writer(output, "forest", kForestComment, forest_view(config.seed));
   ForestBuilder(config, writer).build();
   return writer.finish();
 }

@@ -11,7 +11,6 @@ namespace packtrace::scenegen {
 namespace {
 
 constexpr double kEaves = 0.42;
-const DAffine kHere(1.0);
 
 /// The four sides of a block as facade frames: front, right, back, left.
 DAffine side_frame(double x0, double x1, double z0, double z1, int side) {

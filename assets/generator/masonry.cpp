@@ -10,7 +10,6 @@
 namespace packtrace::scenegen {
 namespace {
 
-const DAffine kHere(1.0);
 constexpr double kHalf = kWallModule / 2;
 constexpr std::array<const char*, 4> kStones{"stone", "stone", "stone_b", "stone_c"};
 

@@ -14,6 +14,8 @@
 
 namespace packtrace::scenegen {
 
+inline const DAffine kHere(1.0); ///< frame of parts that stay where they are modelled
+
 /// Building blocks of meshes. Each function appends to `mesh`; `frame` maps the block's own space to the model's.
 /// Geometric normals, cross(p1 - p0, p2 - p0), point out of closed blocks.
 

@@ -9,8 +9,6 @@
 namespace packtrace::scenegen {
 namespace {
 
-const DAffine kHere(1.0);
-
 void add_flowers(Model& model, const DAffine& frame, DVec3 spread, int count, Random& random) {
   for (int i = 0; i < count; ++i) {
     const DVec3 out = random_direction(random);

@@ -14,7 +14,7 @@
 namespace packtrace::scenegen {
 namespace {
 
-constexpr const char* kComment =
+constexpr const char* kTownComment =
     "# A harbour town on a terraced hillside: houses, stairs, boats and trees, all instances of small PLY meshes.\n"
     "# To be seen: detail at every scale under ambient light: eaves, shutters, arches, foliage, crates on the pier.\n"
     "# Made by packtrace_scenegen town; pbrt-v3 renders it as it stands.\n\n";
@@ -219,7 +219,7 @@ SceneTotals generate_town(const TownConfig& config, const OutputConfig& output) 
   if (config.instances < 3000 || config.instances > 20'000'000) {
     throw Error(ErrorKind::kUsage, fmt::format("--instances {}: a town takes 3000 to 20000000", config.instances));
   }
-  SceneWriter writer(output, "town", kComment, kView);
+  SceneWriter writer(output, "town", kTownComment, kView);
   write_town_materials(writer);
   TownBuilder(config, writer).build();
   return writer.finish();

@@ -13,7 +13,7 @@
 namespace packtrace::scenegen {
 namespace {
 
-constexpr double kFirstAngle = radians(-62), kLastAngle = radians(112);
+constexpr double kFirstColumnAngle = radians(-62), kLastColumnAngle = radians(112);
 constexpr double kBuiltFrom = radians(-24), kBuiltTo = radians(92);
 
 struct Station {
@@ -95,7 +95,8 @@ Model TownTerrain::make_ground() const {
   std::vector<DVec3> points;
   for (const Station& ring : rings) {
     for (uint32_t i = 0; i <= kColumns; ++i) {
-      points.push_back(place(mix(kFirstAngle, kLastAngle, static_cast<double>(i) / kColumns), ring.inland, ring.level));
+      points.push_back(
+          place(mix(kFirstColumnAngle, kLastColumnAngle, static_cast<double>(i) / kColumns), ring.inland, ring.level));
     }
   }
   const auto material = [&](const Station& ring, double angle, const DVec3& middle, double slope) -> std::string {
@@ -115,7 +116,7 @@ Model TownTerrain::make_ground() const {
       const DVec3 a = points[low], b = points[high], c = points[high + 1], d = points[low + 1];
       if (std::max({a.y, b.y, c.y, d.y}) < -3.0) continue; // invisible sea bed
       const DVec3 normal = glm::cross(c - a, d - b);
-      const double angle = mix(kFirstAngle, kLastAngle, (i + 0.5) / kColumns);
+      const double angle = mix(kFirstColumnAngle, kLastColumnAngle, (i + 0.5) / kColumns);
       const double slope = std::abs(normal.y) / std::max(1e-9, glm::length(normal));
       patch.quad(material(rings[j], angle, (a + b + c + d) * 0.25, slope), {low, high, high + 1, low + 1});
     }
@@ -147,7 +148,7 @@ Model TownTerrain::make_sea() const {
     for (size_t i = 0; i < kColumns; ++i) {
       const double angle = kFrom + 2.0 * kPi * (static_cast<double>(i) + 0.5) / kColumns,
                    radius = (radii[j] + radii[j + 1]) * 0.5;
-      const bool coast = angle > kFirstAngle && angle < kLastAngle;
+      const bool coast = angle > kFirstColumnAngle && angle < kLastColumnAngle;
       const double ground = coast ? height(angle, std::min(radius - quay_radius(angle), 200.0)) : -8.0;
       if (ground > 1.2) continue; // under the land
       const size_t low = j * kColumns + i, high = low + kColumns, next = i + 1 < kColumns ? 1 : 1 - kColumns;

@@ -35,7 +35,7 @@
 namespace packtrace {
 namespace {
 
-[[noreturn]] void fail(const std::string& why) { throw Error(ErrorKind::kInput, why); }
+[[noreturn]] void fail_image(const std::string& why) { throw Error(ErrorKind::kInput, why); }
 
 constexpr const char* kDamaged = "damaged image: ";
 constexpr const char* kTruncated = "damaged image: the file is truncated";
@@ -102,7 +102,7 @@ std::unique_ptr<Sample, StbFree> decode_png(std::span<const std::byte> bytes, in
   std::unique_ptr<Sample, StbFree> pixels(load(reinterpret_cast<const stbi_uc*>(bytes.data()),
                                                static_cast<int>(bytes.size()), &width, &height, &stored_channels,
                                                channels));
-  if (!pixels) fail(std::string(kDamaged) + stbi_failure_reason());
+  if (!pixels) fail_image(std::string(kDamaged) + stbi_failure_reason());
   return pixels;
 }
 
@@ -159,7 +159,7 @@ ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader&
 }
 
 ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
-  if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
+  if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail_image("the image file exceeds 2 GiB");
   const PngHeader header = check_png_chunks(bytes, PngChecksums::kCount, kDamaged);
   // stb_image holds at most two copies of at most four channels.
   const ClaimedImageSize size{header.width, header.height};
@@ -194,7 +194,7 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
 /// TGA has no magic number, so it is tried for files that match no other format.
 ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
   const std::optional<TgaHeader> header = parse_tga_header(bytes);
-  if (!header) fail("not an image in a known format (PNG, JPEG, WebP, TGA, EXR, PFM, HDR)");
+  if (!header) fail_image("not an image in a known format (PNG, JPEG, WebP, TGA, EXR, PFM, HDR)");
   constexpr uint64_t kPixelsPerByte = 64; // a run of up to 128 pixels takes at least two bytes
   const ClaimedImageSize size{header->width, header->height, kPixelsPerByte};
   size.check(bytes.size(), size.width * size.height * 3, wants, memory);
@@ -262,14 +262,14 @@ public:
 
   bool read(char c[], int n) override {
     const auto count = static_cast<size_t>(std::max(n, 0));
-    if (count > bytes_.size() - position_) fail(kTruncated);
+    if (count > bytes_.size() - position_) fail_image(kTruncated);
     if (count > 0) std::memcpy(c, bytes_.data() + position_, count);
     position_ += count;
     return position_ < bytes_.size();
   }
   uint64_t tellg() override { return position_; }
   void seekg(uint64_t position) override {
-    if (position > bytes_.size()) fail(kTruncated);
+    if (position > bytes_.size()) fail_image(kTruncated);
     position_ = static_cast<size_t>(position);
   }
 
@@ -280,13 +280,13 @@ private:
 
 /// Checks the header before OpenEXR reads the file, because OpenEXR allocates before it checks.
 void check_exr(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
-  if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty()) fail(std::string(why));
+  if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty()) fail_image(std::string(why));
   const ExrHeader header = scan_exr_header(bytes, kDamaged);
   // OpenEXR keeps a few blocks, compressed and decompressed.
   constexpr uint64_t kBlockCopies = 4, kAlwaysAcceptedBytes = 64u << 20, kRows = 64;
   const uint64_t block = header.block_bytes();
   if (block > kAlwaysAcceptedBytes && block / kMaxPixelsPerByte > bytes.size())
-    fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
+    fail_image("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
   const uint64_t blocks = block > UINT64_MAX / (2 * kBlockCopies) ? UINT64_MAX / 2 : block * kBlockCopies;
   const ClaimedImageSize size{header.width(), header.height()};
   size.check(bytes.size(), blocks + size.width * kRows * sizeof(Imf::Rgba), wants, memory);
@@ -300,7 +300,7 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, Memory
     const Imath::Box2i box = file.dataWindow();
     const int64_t width = int64_t{box.max.x} - box.min.x + 1, height = int64_t{box.max.y} - box.min.y + 1;
     if ((file.channels() & (Imf::WRITE_RGB | Imf::WRITE_YC)) == 0)
-      fail("the EXR image has none of the channels R, G, B and Y");
+      fail_image("the EXR image has none of the channels R, G, B and Y");
     const auto w = static_cast<uint32_t>(width);
     ImageSummarizer summarizer(w, static_cast<uint32_t>(height), wants);
     uint64_t transparent = 0;
@@ -330,7 +330,7 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, Memory
   } catch (const Error&) {
     throw;
   } catch (const std::exception& error) {
-    fail(std::string("damaged EXR image: ") + error.what());
+    fail_image(std::string("damaged EXR image: ") + error.what());
   }
 }
 
@@ -344,19 +344,21 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, Memory
   for (double& value : header) {
     while (!text.empty() && is_space(text[0])) text.remove_prefix(1);
     const NumberText<double> number = parse_number<double>(text.substr(0, 32));
-    if (number.used == 0 || number.used >= text.size()) fail("damaged PFM header: expected width, height and scale");
+    if (number.used == 0 || number.used >= text.size())
+      fail_image("damaged PFM header: expected width, height and scale");
     value = number.value;
     text.remove_prefix(number.used);
   }
   text.remove_prefix(1); // the one white-space character before the pixels
   const auto is_side = [](double v) { return v >= 1 && v <= 1 << 24 && v == std::floor(v); };
   if (!is_side(header[0]) || !is_side(header[1]))
-    fail("damaged PFM header: width and height must be whole numbers from 1 to 16777216");
-  if (!std::isfinite(header[2]) || header[2] == 0.0) fail("damaged PFM header: the scale must be finite and not 0");
+    fail_image("damaged PFM header: width and height must be whole numbers from 1 to 16777216");
+  if (!std::isfinite(header[2]) || header[2] == 0.0)
+    fail_image("damaged PFM header: the scale must be finite and not 0");
   const auto width = static_cast<uint32_t>(header[0]), height = static_cast<uint32_t>(header[1]);
   ClaimedImageSize{width, height, 1}.check(bytes.size(), 0, wants, memory);
   const size_t row_bytes = static_cast<size_t>(width) * channels * 4;
-  if (text.size() / row_bytes < height) fail(kTruncated);
+  if (text.size() / row_bytes < height) fail_image(kTruncated);
   const bool swap = header[2] > 0.0;
   ImageSummarizer summarizer(width, height, wants);
   for (uint32_t y = 0; y < height; ++y) {
@@ -396,7 +398,7 @@ ImageSummary read_by_format(std::span<const std::byte> bytes, bool decode_srgb, 
   if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, wants, memory);
   if (text.starts_with("#?")) return read_hdr(bytes, wants, memory);
   if (const std::string_view name = other_format(text); !name.empty())
-    fail("images in " + std::string(name) + " format are not read, only PNG, JPEG, WebP, TGA, EXR, PFM and HDR");
+    fail_image("images in " + std::string(name) + " format are not read, only PNG, JPEG, WebP, TGA, EXR, PFM and HDR");
   if (text.starts_with("\xff\xd8\xff")) return read_jpeg(bytes, decode_srgb, wants, memory);
   if (WebpReader::is_webp(bytes)) return read_webp(bytes, decode_srgb, wants, memory);
   return text.starts_with("\x89PNG") ? read_png(bytes, decode_srgb, wants, memory)

@@ -20,17 +20,18 @@ constexpr size_t kMaxStations = (size_t{1} << 24) / (kSides + 1);
 // Memory of the mesh per station: a row of vertices and two triangles per vertex.
 constexpr uint64_t kBytesPerStation = (kSides + 1) * (2 * sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle));
 
-[[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
+[[noreturn]] void fail_curve(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
 Bezier elevated(DVec3 a, DVec3 b, DVec3 c) { return {a, glm::mix(a, b, 2.0 / 3.0), glm::mix(b, c, 1.0 / 3.0), c}; }
 
 /// Converts all segments to cubic Bezier curves.
 std::vector<Bezier> segments_of(const CurveParameters& curve) {
-  if (curve.degree != 2 && curve.degree != 3) fail("the curve's degree is neither 2 nor 3");
+  if (curve.degree != 2 && curve.degree != 3) fail_curve("the curve's degree is neither 2 nor 3");
   const size_t degree = curve.degree, count = curve.points.size();
   const bool bezier = curve.basis == CurveBasis::kBezier;
   if (count < degree + 1 || (bezier && (count - 1) % degree != 0))
-    fail(std::to_string(count) + " control points do not make curve segments of degree " + std::to_string(degree));
+    fail_curve(std::to_string(count) + " control points do not make curve segments of degree " +
+               std::to_string(degree));
   const size_t segment_count = bezier ? (count - 1) / degree : count - degree;
   std::vector<Bezier> segments(segment_count);
   for (size_t s = 0; s < segment_count; ++s) {
@@ -95,11 +96,11 @@ DVec3 slerp(DVec3 a, DVec3 b, double t) {
 
 DVec3 unit(Vec3 v) {
   const double length = glm::length(DVec3(v));
-  if (!(length > 0.0) || !std::isfinite(length)) fail("a curve's normal is zero or not finite");
+  if (!(length > 0.0) || !std::isfinite(length)) fail_curve("a curve's normal is zero or not finite");
   return DVec3(v) / length;
 }
 
-[[noreturn]] void fail_too_many() {
+[[noreturn]] void fail_too_long() {
   throw Error(ErrorKind::kLimitExceeded, "the curve's width asks for more than 2^24 vertices");
 }
 
@@ -110,14 +111,14 @@ public:
       : curve_(curve), segment_count_(static_cast<double>(segments.size())), tolerance_(centre_tolerance(curve)) {
     uint64_t count = 1;
     for (const Bezier& b : segments) count += piece_count(b, tolerance_);
-    if (count > kMaxStations) fail_too_many();
+    if (count > kMaxStations) fail_too_long();
     reserve_for_shape(memory, count * (sizeof(Station) + kBytesPerStation));
     stations_.reserve(count);
     for (size_t s = 0; s < segments.size(); ++s) add_segment(segments[s], s);
   }
 
   std::vector<Station> take() {
-    if (stations_.size() < 2) fail("the curve has no length");
+    if (stations_.size() < 2) fail_curve("the curve has no length");
     return std::move(stations_);
   }
 
@@ -153,7 +154,7 @@ private:
   }
 
   void push(const Station& station) {
-    if (stations_.size() == kMaxStations) fail_too_many();
+    if (stations_.size() == kMaxStations) fail_too_long();
     stations_.push_back(station);
   }
 
@@ -250,23 +251,23 @@ Mesh make_ribbon(const std::vector<Station>& stations) {
 
 Mesh tessellate_curve(const CurveParameters& curve, MemoryReservation* memory) {
   for (const Vec3& p : curve.points)
-    if (!is_finite(p)) fail("a control point of the curve is not finite");
+    if (!is_finite(p)) fail_curve("a control point of the curve is not finite");
   if (!std::isfinite(curve.width0) || !std::isfinite(curve.width1) || curve.width0 < 0.0f || curve.width1 < 0.0f)
-    fail("a width of the curve is negative or not finite");
-  if (curve.width0 == 0.0f && curve.width1 == 0.0f) fail("the curve has no width");
+    fail_curve("a width of the curve is negative or not finite");
+  if (curve.width0 == 0.0f && curve.width1 == 0.0f) fail_curve("the curve has no width");
   const std::vector<Bezier> segments = segments_of(curve);
   const bool ribbon = curve.type == CurveType::kRibbon;
   if (ribbon && curve.normals.size() != segments.size() + 1)
-    fail("a ribbon of " + std::to_string(segments.size()) + " segments needs one normal more than segments, not " +
-         std::to_string(curve.normals.size()));
+    fail_curve("a ribbon of " + std::to_string(segments.size()) +
+               " segments needs one normal more than segments, not " + std::to_string(curve.normals.size()));
   std::vector<Station> stations = StationMaker(curve, segments, memory).take();
   // Vectors double their capacity as they grow.
   reserve_for_shape(memory, stations.size() * (sizeof(Station) + 2 * kBytesPerStation));
   Mesh mesh = ribbon ? make_ribbon(stations) : make_tube(std::move(stations));
   for (const Vec3& p : mesh.positions)
-    if (!is_finite(p)) fail("the curve leaves the range of single precision");
+    if (!is_finite(p)) fail_curve("the curve leaves the range of single precision");
   clean_up_mesh(mesh, {}); // removes vertices of omitted triangles
-  if (mesh.triangles.empty()) fail("nothing of the curve can be drawn");
+  if (mesh.triangles.empty()) fail_curve("nothing of the curve can be drawn");
   return mesh;
 }
 

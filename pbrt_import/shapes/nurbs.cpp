@@ -17,15 +17,15 @@ namespace packtrace {
 namespace {
 
 using DVec4 = glm::dvec4;
-constexpr uint64_t kMaxVertices = uint64_t{1} << 24;
+constexpr uint64_t kMaxNurbsVertices = uint64_t{1} << 24;
 constexpr uint32_t kMaxOrder = 32;
 constexpr uint32_t kMaxSegmentsPerSpan = 128;
 
-[[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
+[[noreturn]] void fail_nurbs(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
 [[noreturn]] void fail_too_many() {
   throw Error(ErrorKind::kLimitExceeded,
-              "the nurbs surface asks for more than " + std::to_string(kMaxVertices) + " vertices");
+              "the nurbs surface asks for more than " + std::to_string(kMaxNurbsVertices) + " vertices");
 }
 
 std::string two_digits(double value) {
@@ -56,19 +56,19 @@ struct Axis {
 Axis make_axis(const char* name, uint32_t count, uint32_t order, std::span<const float> knots,
                std::optional<float> from, std::optional<float> to) {
   const std::string axis(name);
-  if (order < 2 || order > kMaxOrder) fail("the order along " + axis + " is not within [2, 32]");
-  if (count < order) fail("fewer control points along " + axis + " than its order");
+  if (order < 2 || order > kMaxOrder) fail_nurbs("the order along " + axis + " is not within [2, 32]");
+  if (count < order) fail_nurbs("fewer control points along " + axis + " than its order");
   if (knots.size() != uint64_t{count} + order)
-    fail("the number of " + axis + " knots is not that of the control points plus the order");
+    fail_nurbs("the number of " + axis + " knots is not that of the control points plus the order");
   if (!std::all_of(knots.begin(), knots.end(), [](float k) { return std::isfinite(k); }) ||
       !std::is_sorted(knots.begin(), knots.end()))
-    fail("the " + axis + " knots are not finite and in order");
+    fail_nurbs("the " + axis + " knots are not finite and in order");
   Axis result{{knots.begin(), knots.end()}, order, count, 0.0, 0.0};
   const double low = knots[order - 1], high = knots[count];
   result.begin = from.value_or(knots[order - 1]);
   result.end = to.value_or(knots[count]);
   if (!(result.begin >= low && result.end <= high && result.begin < result.end))
-    fail("the range of " + axis + " is empty or leaves the knots");
+    fail_nurbs("the range of " + axis + " is empty or leaves the knots");
   return result;
 }
 
@@ -139,9 +139,9 @@ public:
 
   private:
     DVec3 projected(const DVec4& p) const {
-      if ((p.w > 0.0) != surface_.weight_is_positive_) fail("the nurbs surface runs through infinity");
+      if ((p.w > 0.0) != surface_.weight_is_positive_) fail_nurbs("the nurbs surface runs through infinity");
       const DVec3 position = DVec3(p) / p.w;
-      if (!is_finite(Vec3(position))) fail("a point of the nurbs surface is not finite");
+      if (!is_finite(Vec3(position))) fail_nurbs("a point of the nurbs surface is not finite");
       return position;
     }
 
@@ -172,7 +172,7 @@ std::vector<double> grid_lines(const Axis& axis, uint32_t segments) {
   for (const double knot : axis.knots)
     if (knot > stops.back() && knot < axis.end) stops.push_back(knot);
   stops.push_back(axis.end);
-  if ((stops.size() - 1) * segments > kMaxVertices) fail_too_many();
+  if ((stops.size() - 1) * segments > kMaxNurbsVertices) fail_too_many();
   std::vector<double> lines{axis.begin};
   lines.reserve((stops.size() - 1) * segments + 1);
   for (size_t i = 0; i + 1 < stops.size(); ++i)
@@ -246,7 +246,7 @@ Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relativ
   // Starts with four segments, so that an inflection in the middle of a span does not look straight.
   uint32_t u_segments = u.order > 2 ? 4 : 1, v_segments = v.order > 2 ? 4 : 1;
   Grid grid{grid_lines(u, u_segments), grid_lines(v, v_segments)};
-  if (grid.vertex_count() > kMaxVertices) fail_too_many();
+  if (grid.vertex_count() > kMaxNurbsVertices) fail_too_many();
   while (true) {
     reserve_mesh(memory, grid); // before it is measured, which takes longer
     const Deviation deviation = measure(grid, surface, check_cancelled);
@@ -258,7 +258,7 @@ Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relativ
     refine_v = refine_v && v_segments < kMaxSegmentsPerSpan;
     u_segments *= refine_u ? 2 : 1;
     v_segments *= refine_v ? 2 : 1;
-    const bool too_many = line_count(grid.u, refine_u) * line_count(grid.v, refine_v) > kMaxVertices;
+    const bool too_many = line_count(grid.u, refine_u) * line_count(grid.v, refine_v) > kMaxNurbsVertices;
     Grid finer;
     if (!too_many) finer = {grid_lines(u, u_segments), grid_lines(v, v_segments)};
     if (too_many || finer.vertex_count() == grid.vertex_count()) {
@@ -310,14 +310,14 @@ Mesh mesh_of(const Grid& grid, const Surface& surface, const CheckCancelledFn& c
 Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, const ReportFn& report,
                       const CheckCancelledFn& check_cancelled, MemoryReservation* memory) {
   if (!(relative_tolerance >= 1e-6 && relative_tolerance <= 0.5))
-    fail("the tessellation tolerance is not within [1e-6, 0.5]");
+    fail_nurbs("the tessellation tolerance is not within [1e-6, 0.5]");
   const Axis u = make_axis("u", nurbs.nu, nurbs.u_order, nurbs.u_knots, nurbs.u0, nurbs.u1);
   const Axis v = make_axis("v", nurbs.nv, nurbs.v_order, nurbs.v_knots, nurbs.v0, nurbs.v1);
   if (uint64_t{nurbs.nu} * nurbs.nv != nurbs.control_points.size())
-    fail("the nurbs surface has " + std::to_string(nurbs.control_points.size()) +
-         " control points for nu x nv = " + std::to_string(uint64_t{nurbs.nu} * nurbs.nv));
+    fail_nurbs("the nurbs surface has " + std::to_string(nurbs.control_points.size()) +
+               " control points for nu x nv = " + std::to_string(uint64_t{nurbs.nu} * nurbs.nv));
   for (const glm::vec4& p : nurbs.control_points)
-    if (!is_finite(Vec3(p)) || !std::isfinite(p.w)) fail("a control point is not finite");
+    if (!is_finite(Vec3(p)) || !std::isfinite(p.w)) fail_nurbs("a control point is not finite");
   const Surface surface(u, v, nurbs.control_points);
   const Grid grid = refine(u, v, surface, relative_tolerance, report, check_cancelled, memory);
   return mesh_of(grid, surface, check_cancelled);

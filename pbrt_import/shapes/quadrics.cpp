@@ -18,10 +18,10 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-[[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
+[[noreturn]] void fail_quadric(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
 void require(bool condition, const char* problem) {
-  if (!condition) fail(problem);
+  if (!condition) fail_quadric(problem);
 }
 
 void require_finite(std::initializer_list<float> values) {

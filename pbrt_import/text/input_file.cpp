@@ -16,14 +16,14 @@
 namespace packtrace {
 namespace {
 
-[[noreturn]] void fail(const std::string& what) { throw Error(ErrorKind::kInput, what); }
+[[noreturn]] void fail_reading(const std::string& what) { throw Error(ErrorKind::kInput, what); }
 
 /// Owns a zlib inflate stream.
 class Inflater {
 public:
   Inflater() {
     constexpr int kGzipWindow = 15 + 16; // largest window; accept the gzip format only
-    if (inflateInit2(&stream_, kGzipWindow) != Z_OK) fail("cannot start inflating");
+    if (inflateInit2(&stream_, kGzipWindow) != Z_OK) fail_reading("cannot start inflating");
   }
   ~Inflater() { inflateEnd(&stream_); }
   Inflater(const Inflater&) = delete;
@@ -54,7 +54,7 @@ struct InputFile::State {
     while (got < size) {
       const ssize_t n = read_some(to + got, std::min<size_t>(size - got, 1u << 30), got);
       if (n < 0 && errno == EINTR) continue;
-      if (n < 0) fail(std::string("reading failed: ") + std::strerror(errno));
+      if (n < 0) fail_reading(std::string("reading failed: ") + std::strerror(errno));
       if (n == 0) break;
       got += static_cast<size_t>(n);
     }
@@ -83,12 +83,12 @@ struct InputFile::State {
 
   /// Returns the bytes that precede damage first and reports the damage in the next call.
   size_t read_inflated(char* to, size_t size) {
-    if (damage) fail(damage);
+    if (damage) fail_reading(damage);
     z_stream& z = inflater->stream();
     size_t got = 0;
     while (got < size && refill()) {
       if (!member_open) { // a gzip file may consist of several members
-        if (inflateReset(&z) != Z_OK) fail("cannot start inflating");
+        if (inflateReset(&z) != Z_OK) fail_reading("cannot start inflating");
         member_open = true;
       }
       const auto room = static_cast<uInt>(std::min<size_t>(size - got, 1u << 30));
@@ -103,7 +103,7 @@ struct InputFile::State {
       }
     }
     if (got < size && member_open && !damage) damage = "truncated gzip data";
-    if (damage && got == 0) fail(damage);
+    if (damage && got == 0) fail_reading(damage);
     return got;
   }
 };

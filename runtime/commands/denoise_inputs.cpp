@@ -12,8 +12,6 @@
 namespace packtrace {
 namespace {
 
-constexpr uint64_t kMaxPictures = 10'000'000;
-
 namespace fs = std::filesystem;
 
 bool is_pattern(const std::string& word) {

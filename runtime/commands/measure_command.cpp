@@ -135,7 +135,7 @@ Words tracer_words(const MeasureOptions& options) {
   return words;
 }
 
-std::string command_text(const MeasureOptions& options) {
+std::string measure_command_text(const MeasureOptions& options) {
   Words words{"packtrace", "measure", options.input, "-o", options.output};
   if (options.quick) words.emplace_back("--quick");
   if (options.full) words.emplace_back("--full");
@@ -157,7 +157,7 @@ MeasureConfig config_of(const MeasureOptions& options, const GlobalOptions& glob
   config.matrix_scene.diagonal = source.world_bounds().diagonal();
   config.matrix_scene.has_uvs =
       std::ranges::any_of(imported.scene.meshes, [](const Mesh& m) { return !m.uvs.empty(); });
-  config.version = version, config.command = command_text(options);
+  config.version = version, config.command = measure_command_text(options);
   config.scene = scene_json(options, imported, source), config.machine = machine_json(globals);
   config.instance_names = instance_names(imported.scene);
   config.output = options.output, config.force = globals.force, config.max_error = options.max_error;

@@ -6,6 +6,8 @@
 
 namespace packtrace {
 
+inline constexpr uint64_t kMaxPictures = 10'000'000; ///< of a sequence
+
 /// A file name with one place for a number, written as in printf: %d, or %0Nd for N digits with leading zeros. %% is a
 /// percent sign.
 class NumberedName {

@@ -12,11 +12,11 @@
 #include "pbrt_import/scene/world_view.h"
 #include "runtime/commands/camera_path_file.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/commands/sequence_names.h"
 
 namespace packtrace {
 namespace {
 
-constexpr uint64_t kMaxPictures = 10'000'000;
 constexpr uint32_t kMaxSubframes = 4096;
 constexpr double kDefaultSeconds = 4.0;
 

@@ -30,7 +30,7 @@ Json read_report(const fs::path& file) {
 }
 
 /// Streams of a file on disk, largest first.
-Json streams_of(const Json& bake) {
+Json stream_list(const Json& bake) {
   std::vector<std::pair<std::string, uint64_t>> streams;
   const Json& disk = bake.at("disk");
   const Json& by_name = disk.contains("streams") ? disk.at("streams") : bake.at("bytes");
@@ -217,7 +217,7 @@ void PointRunner::add_file_values(nlohmann::json& point) const {
   point["bytes"] = {{"file", bytes},
                     {"memory", b.at("/bytes/total"_json_pointer)},
                     {"per_triangle", triangles > 0 ? Json(static_cast<double>(bytes) / triangles) : Json()},
-                    {"streams", streams_of(b)}};
+                    {"streams", stream_list(b)}};
   const auto max = b.at("max_position_error").get<double>();
   point["position"] = {{"max", max},
                        {"rms", b.at("rms_position_error")},

@@ -12,9 +12,9 @@ constexpr size_t kLeafBoxes = 4;
 
 /// A binary tree over boxes, split at the median along the widest axis of their centres. Nodes are in depth-first
 /// order: the left child of node n is n + 1.
-class BoxTree {
+class TouchTree {
 public:
-  BoxTree(std::span<const Bounds> boxes, std::span<const double> sizes) : boxes_(boxes), sizes_(sizes) {
+  TouchTree(std::span<const Bounds> boxes, std::span<const double> sizes) : boxes_(boxes), sizes_(sizes) {
     std::vector<Item> items;
     for (uint32_t i = 0; i < boxes.size(); ++i)
       if (!boxes[i].empty()) items.push_back({boxes[i].lo + boxes[i].hi, i});
@@ -96,7 +96,7 @@ private:
 
 std::vector<double> smallest_touching(std::span<const Bounds> boxes, std::span<const double> sizes,
                                       std::span<const uint32_t> asked) {
-  const BoxTree tree(boxes, sizes);
+  const TouchTree tree(boxes, sizes);
   std::vector<double> result(asked.size());
   tbb::parallel_for(size_t{0}, asked.size(), [&](size_t i) { result[i] = tree.smallest_touching(asked[i]); });
   return result;

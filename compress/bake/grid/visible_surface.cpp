@@ -13,8 +13,8 @@
 namespace packtrace {
 namespace {
 
-constexpr size_t kBlockTriangles = 4096;
-constexpr double kMaxTests = 0x1p28;      // pixels tested per image; a block's share is proportional to its triangles
+constexpr size_t kTrianglesPerBlock = 4096;
+constexpr double kMaxPixelTests = 0x1p28; // pixels tested per image; a block's share is proportional to its triangles
 constexpr double kMinBlockTests = 0x1p20; // smallest share of a block
 
 /// A projected vertex.
@@ -53,16 +53,17 @@ private:
   void draw(const PlacedPart& placed) {
     const Mesh& mesh = parts_.mesh_of(placed);
     const auto points = std::make_unique_for_overwrite<ImagePoint[]>(mesh.positions.size());
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.positions.size(), kBlockTriangles), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.positions.size(), kTrianglesPerBlock), [&](const auto& range) {
       for (size_t v = range.begin(); v < range.end(); ++v)
         points[v] = project(parts_.source_position(placed, static_cast<uint32_t>(v)));
     });
     const size_t count = mesh.triangles.size();
-    tbb::parallel_for(size_t{0}, (count + kBlockTriangles - 1) / kBlockTriangles, [&](size_t block) {
-      const size_t begin = block * kBlockTriangles, end = std::min(begin + kBlockTriangles, count);
+    tbb::parallel_for(size_t{0}, (count + kTrianglesPerBlock - 1) / kTrianglesPerBlock, [&](size_t block) {
+      const size_t begin = block * kTrianglesPerBlock, end = std::min(begin + kTrianglesPerBlock, count);
       // Upper bound of the distance between source and rounded positions.
       const double movement = std::sqrt(0.75) * placed.step;
-      double tests = std::max(kMinBlockTests, kMaxTests * static_cast<double>(end - begin) / parts_.triangle_count());
+      double tests =
+          std::max(kMinBlockTests, kMaxPixelTests * static_cast<double>(end - begin) / parts_.triangle_count());
       for (size_t i = begin; i < end && tests > 0.0; ++i) {
         const Triangle& t = mesh.triangles[i];
         const ImageTriangle source{points[t.x], points[t.y], points[t.z]};
@@ -138,7 +139,7 @@ private:
 
   std::vector<VisiblePoint> points(const NearestTriangles& buffer, PlacedParts::Position position) const {
     std::vector<VisiblePoint> points(buffer.size());
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kBlockTriangles), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kTrianglesPerBlock), [&](const auto& range) {
       for (size_t pixel = range.begin(); pixel < range.end(); ++pixel)
         if (!buffer.empty(pixel)) points[pixel] = point_at(pixel, buffer, position);
     });

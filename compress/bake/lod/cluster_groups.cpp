@@ -15,7 +15,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kNone = ~0u;
+constexpr uint32_t kUnassigned = ~0u;
 constexpr uint32_t kFewClusters = kGroupTargetClusters / 3; // smaller groups join a neighbour if possible
 
 /// A triangle side on the border of a cluster.
@@ -46,7 +46,7 @@ public:
 
 private:
   struct Edge {
-    uint32_t a = 0, b = 0, cluster = kNone; ///< slots of other clusters count as empty
+    uint32_t a = 0, b = 0, cluster = kUnassigned; ///< slots of other clusters count as empty
     bool once = true;
   };
 
@@ -143,7 +143,7 @@ class Grouper {
 public:
   explicit Grouper(const ClusterRuns& clusters)
       : adjacency_(find_adjacency(clusters)), order_(spatial_order(clusters.centers)),
-        group_of_(clusters.ends.size(), kNone), weight_(clusters.ends.size(), 0) {
+        group_of_(clusters.ends.size(), kUnassigned), weight_(clusters.ends.size(), 0) {
     total_.reserve(group_of_.size());
     for (uint32_t i = 0; i < group_of_.size(); ++i) {
       uint32_t sum = 0;
@@ -163,7 +163,7 @@ public:
 
 private:
   void skip_taken() {
-    while (cursor_ < order_.size() && group_of_[order_[cursor_]] != kNone) ++cursor_;
+    while (cursor_ < order_.size() && group_of_[order_[cursor_]] != kUnassigned) ++cursor_;
   }
 
   void grow() {
@@ -173,7 +173,7 @@ private:
     take(order_[cursor_], group);
     while (sizes_[group] < kGroupTargetClusters) {
       uint32_t next = pick();
-      if (next == kNone) {
+      if (next == kUnassigned) {
         if (sizes_[group] >= kFewClusters && !isolated()) break;
         skip_taken();
         if (cursor_ == order_.size()) break;
@@ -199,7 +199,7 @@ private:
     ++sizes_[group];
     members_.push_back(cluster);
     for (const auto& link : adjacency_.of(cluster)) {
-      if (group_of_[link.cluster] != kNone) continue;
+      if (group_of_[link.cluster] != kUnassigned) continue;
       if (weight_[link.cluster] == 0) frontier_.push_back(link.cluster);
       weight_[link.cluster] += link.edges;
     }
@@ -207,11 +207,11 @@ private:
 
   /// The frontier cluster with the largest share of its border in the group.
   uint32_t pick() {
-    uint32_t best = kNone;
+    uint32_t best = kUnassigned;
     double best_share = -1.0;
     size_t kept = 0;
     for (const uint32_t cluster : frontier_) {
-      if (group_of_[cluster] != kNone) {
+      if (group_of_[cluster] != kUnassigned) {
         weight_[cluster] = 0;
         continue;
       }
@@ -229,7 +229,7 @@ private:
     for (const uint32_t cluster : members_)
       for (const auto& link : adjacency_.of(cluster)) {
         const uint32_t other = group_of_[link.cluster];
-        if (other == group || other == kNone || sizes_[other] + sizes_[group] > kMaxGroupClusters) continue;
+        if (other == group || other == kUnassigned || sizes_[other] + sizes_[group] > kMaxGroupClusters) continue;
         const auto found = std::find_if(shared.begin(), shared.end(), [&](const auto& s) { return s.first == other; });
         if (found == shared.end())
           shared.emplace_back(other, link.edges);
@@ -248,7 +248,7 @@ private:
   std::vector<uint32_t> number_groups() {
     std::vector<uint32_t> number(sizes_.size());
     uint32_t count = 0;
-    for (size_t i = 0; i < sizes_.size(); ++i) number[i] = sizes_[i] > 0 ? count++ : kNone;
+    for (size_t i = 0; i < sizes_.size(); ++i) number[i] = sizes_[i] > 0 ? count++ : kUnassigned;
     for (uint32_t& group : group_of_) group = number[group];
     return std::move(group_of_);
   }

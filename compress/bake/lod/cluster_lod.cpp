@@ -16,7 +16,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kNone = ~0u;
+constexpr uint32_t kNoCluster = ~0u;
 constexpr double kKept = 0.47; // share of the triangles that a level keeps
 // The last few hundred triangles are reduced faster: each level adds records that would take more space than its
 // clusters.
@@ -155,7 +155,7 @@ private:
 
   /// Sets owner_ to each position's group, or kShared if it belongs to several.
   void mark_owners(const std::vector<std::vector<uint32_t>>& members) {
-    owner_.assign(lod_.positions.size(), kNone);
+    owner_.assign(lod_.positions.size(), kNoCluster);
     tbb::parallel_for(size_t{0}, members.size(), [&](size_t group) {
       for (const uint32_t number : members[group]) {
         const LodCluster& c = lod_.clusters[number];
@@ -165,7 +165,7 @@ private:
             std::atomic_ref<uint32_t> owner(owner_[lod_.vertices[t[corner]].position]);
             uint32_t expected = owner.load(std::memory_order_relaxed);
             if (expected == group || expected == kShared) continue; // mostly; exchanges take several times as long
-            expected = kNone;
+            expected = kNoCluster;
             if (!owner.compare_exchange_strong(expected, static_cast<uint32_t>(group), std::memory_order_relaxed) &&
                 expected != group)
               owner.store(kShared, std::memory_order_relaxed);

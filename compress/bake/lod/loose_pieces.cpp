@@ -12,7 +12,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kNone = ~0u;
+constexpr uint32_t kNoPiece = ~0u;
 constexpr double kMaxPieceCost = 3.0; // maximum cost of a piece, relative to the largest error of the input
 
 struct Piece {
@@ -25,7 +25,7 @@ struct Piece {
 /// The triangle nearest to a piece, which stands for it once the piece is dropped.
 struct PieceSubstitute {
   double distance = std::numeric_limits<double>::infinity();
-  uint32_t piece = kNone, triangle = kNone;
+  uint32_t piece = kNoPiece, triangle = kNoPiece;
 };
 
 class Dropper {
@@ -34,7 +34,7 @@ public:
 
   std::vector<TriangleSubstitute> run(const DropTargets& targets) {
     find_pieces();
-    stand_of_.assign(pieces_.size(), kNone);
+    stand_of_.assign(pieces_.size(), kNoPiece);
     if (pieces_.size() > 1) drop_some(targets);
     return remove_dropped();
   }
@@ -57,9 +57,9 @@ private:
       for (const uint32_t i : order) {
         if (live <= target) break;
         if (pieces_[i].dropped) continue;
-        if (stands[i].piece == kNone || pieces_[stands[i].piece].dropped) stands[i] = find_substitute(i);
+        if (stands[i].piece == kNoPiece || pieces_[stands[i].piece].dropped) stands[i] = find_substitute(i);
         const PieceSubstitute& stand = stands[i];
-        if (stand.piece == kNone) break; // the last piece
+        if (stand.piece == kNoPiece) break; // the last piece
         if (!any_cost && pieces_[i].error + stand.distance > dear) continue;
         drop(i, stand);
         live -= pieces_[i].triangles.size();
@@ -87,11 +87,11 @@ private:
         const uint32_t a = root(t.points[0]), b = root(t.points[i]);
         parent[std::max(a, b)] = std::min(a, b);
       }
-    std::vector<uint32_t> piece_of(m_.points.size(), kNone);
+    std::vector<uint32_t> piece_of(m_.points.size(), kNoPiece);
     for (uint32_t i = 0; i < m_.triangles.size(); ++i) {
       const LodTriangle& t = m_.triangles[i];
       uint32_t& number = piece_of[root(t.points[0])];
-      if (number == kNone) number = static_cast<uint32_t>(pieces_.size()), pieces_.emplace_back();
+      if (number == kNoPiece) number = static_cast<uint32_t>(pieces_.size()), pieces_.emplace_back();
       Piece& piece = pieces_[number];
       piece.triangles.push_back(i);
       piece.error = std::max(piece.error, t.error);
@@ -121,7 +121,7 @@ private:
   PieceSubstitute find_substitute(uint32_t number) const {
     constexpr size_t kTried = 3; // number of pieces tried, those with the nearest centres
     std::array<std::pair<double, uint32_t>, kTried> nearest;
-    nearest.fill({std::numeric_limits<double>::infinity(), kNone});
+    nearest.fill({std::numeric_limits<double>::infinity(), kNoPiece});
     const Piece& piece = pieces_[number];
     for (uint32_t i = 0; i < pieces_.size(); ++i) {
       if (i == number || pieces_[i].dropped) continue;
@@ -132,7 +132,7 @@ private:
     }
     PieceSubstitute best;
     for (const auto& [unused, other] : nearest) {
-      if (other == kNone) continue;
+      if (other == kNoPiece) continue;
       for (const uint32_t triangle : pieces_[other].triangles) {
         const double d = distance(piece, m_.triangles[triangle].points, best.distance);
         if (d < best.distance) best = {d, other, triangle};

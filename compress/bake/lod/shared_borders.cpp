@@ -15,7 +15,7 @@ namespace packtrace {
 namespace {
 
 constexpr double kFolded = 0.9999; // minimum cosine between the layers of a sheet
-constexpr size_t kGrain = 2048;
+constexpr size_t kBorderGrain = 2048;
 
 /// A hash that is equal for equal positions on any lattice: each coordinate is reduced to an odd mantissa and an
 /// exponent.
@@ -31,9 +31,9 @@ uint64_t position_hash(const LatticePoint& p, const PositionGrid& grid) {
 }
 
 /// The triangles around each position.
-class Stars {
+class BorderStars {
 public:
-  explicit Stars(const QuantizedGeometry& geometry) : g_(geometry), ends_(geometry.positions.size() + 1) {
+  explicit BorderStars(const QuantizedGeometry& geometry) : g_(geometry), ends_(geometry.positions.size() + 1) {
     for (const Triangle& t : g_.triangles)
       if (const Triangle p = points_of(t); has_edges(p))
         for (int i = 0; i < 3; ++i) ++ends_[p[i] + 1];
@@ -103,7 +103,7 @@ private:
 
 template <typename PerPosition>
 void for_each_position(const QuantizedGeometry& geometry, const PerPosition& per_position) {
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, geometry.positions.size(), kGrain),
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, geometry.positions.size(), kBorderGrain),
                     [&](const tbb::blocked_range<size_t>& range) {
                       for (size_t i = range.begin(); i < range.end(); ++i) per_position(i);
                     });
@@ -112,7 +112,7 @@ void for_each_position(const QuantizedGeometry& geometry, const PerPosition& per
 } // namespace
 
 std::vector<uint8_t> border_positions(const QuantizedGeometry& geometry) {
-  const Stars stars(geometry);
+  const BorderStars stars(geometry);
   std::vector<uint8_t> result(geometry.positions.size());
   for_each_position(geometry, [&](size_t i) { result[i] = stars.on_border(static_cast<uint32_t>(i)); });
   return result;

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kSamplesPerSegment = 8;
 constexpr double kBetweenSamples = 1.25;
-constexpr double kRounding = 0x1p-44; ///< of computing poses in doubles, relative to coordinates
+constexpr double kPoseRounding = 0x1p-44; ///< of computing poses in doubles, relative to coordinates
 
 /// An instance or a camera, as what moves.
 struct Mover {
@@ -141,7 +141,7 @@ private:
         far = std::max(far, glm::length(p));
       }
     }
-    return largest + kRounding * far;
+    return largest + kPoseRounding * far;
   }
 
   /// Largest distance from the origin of the space in which a track turns and scales.

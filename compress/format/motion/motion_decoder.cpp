@@ -75,16 +75,16 @@ private:
 };
 
 /// Numbers base + field 2^exponent, one field per key.
-struct Channel {
+struct MotionChannel {
   uint32_t bits = 0;
   double base = 0.0, step = 0.0;
 
   double value(MotionReader& in) const { return base + static_cast<double>(in.field(bits)) * step; }
 };
 
-void read_channels(MotionReader& in, std::span<Channel> channels) {
+void read_channels(MotionReader& in, std::span<MotionChannel> channels) {
   uint32_t most = 0;
-  for (Channel& channel : channels) {
+  for (MotionChannel& channel : channels) {
     channel.bits = in.value<uint8_t>();
     if (channel.bits > kMaxChannelBits) throw Damaged{"width"};
     most = std::max(most, channel.bits);
@@ -92,7 +92,7 @@ void read_channels(MotionReader& in, std::span<Channel> channels) {
   int exponent = 0;
   if (most > 0) exponent = in.value<int16_t>();
   if (exponent < kMinChannelExponent || exponent > kMaxChannelExponent) throw Damaged{"step"};
-  for (Channel& channel : channels) {
+  for (MotionChannel& channel : channels) {
     channel.base = in.finite(), channel.step = std::ldexp(1.0, exponent);
     const double reach = std::abs(channel.base) + std::ldexp(1.0, static_cast<int>(channel.bits) + exponent);
     if (!(reach <= kMaxChannelValue)) throw Damaged{"value out of range"};
@@ -150,7 +150,7 @@ MotionTrack read_track(MotionReader& in) {
     throw Damaged{"number of keys"};
   read_times(in, uniform, track, count);
 
-  std::array<Channel, 3> translation;
+  std::array<MotionChannel, 3> translation;
   read_channels(in, translation);
   glm::dquat constant(1.0, 0.0, 0.0, 0.0);
   uint32_t rotation_bits = 0;
@@ -162,12 +162,12 @@ MotionTrack read_track(MotionReader& in) {
     if (rotation_bits < 2 || rotation_bits > TrackSteps::kMaxRotationBits) throw Damaged{"width"};
   }
   const ScaleEntries& entries = kScaleEntries[static_cast<size_t>(scale_form)];
-  std::array<Channel, 9> scale;
+  std::array<MotionChannel, 9> scale;
   read_channels(in, std::span(scale).first(entries.count));
 
   uint32_t bits = rotation_bits > 0 ? 3 + 3 * rotation_bits : 0;
-  for (const Channel& channel : translation) bits += channel.bits;
-  for (const Channel& channel : scale) bits += channel.bits;
+  for (const MotionChannel& channel : translation) bits += channel.bits;
+  for (const MotionChannel& channel : scale) bits += channel.bits;
   if (count > 1 && (bits == 0 || (bits + 7) / 8 > in.left() / count)) throw Damaged{"number of keys"};
   for (MotionKey& key : track.keys) {
     for (int axis = 0; axis < 3; ++axis) key.translation[axis] = translation[static_cast<size_t>(axis)].value(in);

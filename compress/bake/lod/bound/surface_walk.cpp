@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kMaxSteps = 32; // maximum number of triangles on a path
+constexpr uint32_t kMaxPathTriangles = 32; // maximum number of triangles on a path
 // minimum sine (edge to normal) of a slice; minimum cosine (normals) of an image's triangle
 constexpr double kSteep = 0.05;
 
@@ -129,7 +129,7 @@ void SurfaceWalk::find_place(uint32_t source, Place& out) const {
       out.state = Place::State::kPoint;
     return;
   }
-  for (uint32_t step = 0; step < kMaxSteps; ++step) {
+  for (uint32_t step = 0; step < kMaxPathTriangles; ++step) {
     const double t = exit.side_right / (exit.side_right - exit.side_left);
     const DVec3 crossing = *exit.right + t * (*exit.left - *exit.right);
     if (glm::dot(crossing - slice.from, slice.along) >= 1.0) {
@@ -178,8 +178,8 @@ void SurfaceWalk::find_path(uint32_t edge, uint32_t a, uint32_t b, EdgePath& out
 
 /// Reserves space for the crossings of one more path.
 inline void SurfaceWalk::make_room() {
-  if (crossing_count_ + kMaxSteps <= crossing_room_) return;
-  crossing_room_ = std::max(2 * crossing_room_, 2 * ways_.size() + kMaxSteps);
+  if (crossing_count_ + kMaxPathTriangles <= crossing_room_) return;
+  crossing_room_ = std::max(2 * crossing_room_, 2 * ways_.size() + kMaxPathTriangles);
   auto larger = std::make_unique_for_overwrite<Crossing[]>(crossing_room_);
   std::copy_n(crossings_.get(), crossing_count_, larger.get());
   crossings_ = std::move(larger);
@@ -189,7 +189,7 @@ inline void SurfaceWalk::make_room() {
 inline bool SurfaceWalk::cross(const Slice& slice, Exit& exit, const Place& goal) {
   const bool to_point = goal.state == Place::State::kPoint;
   double last = 0.0;
-  for (uint32_t step = 0; step < kMaxSteps; ++step) {
+  for (uint32_t step = 0; step < kMaxPathTriangles; ++step) {
     const double t = exit.side_right / (exit.side_right - exit.side_left);
     const DVec3 crossing = *exit.right + t * (*exit.left - *exit.right);
     const double on = glm::dot(crossing - slice.from, slice.along);

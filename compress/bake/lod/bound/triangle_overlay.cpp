@@ -11,7 +11,7 @@ namespace packtrace {
 namespace {
 
 constexpr double kSteep = 0.05;               // cosine; steeper triangles count as edge-on
-constexpr double kRounding = 1e-6;            // tolerance of the coverage, which is an integer
+constexpr double kCoverageRounding = 1e-6;    // tolerance of the coverage, which is an integer
 constexpr double kLeastCoverage = 1e-3;       // by the largest piece, of triangles that stick out over borders
 constexpr double kFullCoverage = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
 static_assert(sizeof(DVec3) == 3 * sizeof(double));
@@ -108,14 +108,14 @@ bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std
   };
   const auto no_open_sides = [&] { return has_no_open_sides(std::span(found_).first(found_count_)); };
   find();
-  if (cover.count < 1.0 - kRounding) return false;
+  if (cover.count < 1.0 - kCoverageRounding) return false;
   bool together = no_open_sides();
   if (!together && cover.count >= kFullCoverage) {
     task_.enough = std::numeric_limits<double>::infinity();
     find();
     together = no_open_sides();
   }
-  if (!together || std::abs(cover.count - std::round(cover.count)) > kRounding) return false;
+  if (!together || std::abs(cover.count - std::round(cover.count)) > kCoverageRounding) return false;
   pieces.insert(pieces.end(), found_.begin(), found_.begin() + found_count_);
   return true;
 }

@@ -14,7 +14,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kNone = ~0u;
+constexpr uint32_t kUnknownEdge = ~0u;
 constexpr double kLargestTurn = 0.2; // minimum cosine between a triangle's normals before and after a collapse
 constexpr double kRetryShare = 0.75; // share of the triangles left at which rejected edges are tried again
 
@@ -250,7 +250,7 @@ private:
 
   /// Merges the two sides of a vanishing triangle that become one.
   void merge_edges(uint32_t triangle, uint32_t kept, uint32_t gone) {
-    uint32_t of_kept = kNone, of_gone = kNone;
+    uint32_t of_kept = kUnknownEdge, of_gone = kUnknownEdge;
     for (uint32_t i = 0; i < 3; ++i) {
       const uint32_t p = corners_.point(4 * triangle + i),
                      q = corners_.point(CornerLists::next_corner(4 * triangle + i));

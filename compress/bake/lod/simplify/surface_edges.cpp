@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kNone = ~0u;
+constexpr uint32_t kNoEdge = ~0u;
 constexpr double kBorderWeight = 8.0;  // of border planes, relative to triangle planes
 constexpr double kSeamWeight = 2.0;    // at material seams
 constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates are discontinuous
@@ -48,7 +48,7 @@ class EdgeFinder {
 public:
   EdgeFinder(const SimplifyMesh& mesh, const SimplifyConfig& config)
       : m_(mesh), config_(config), many_seams_(!mesh.wedges.empty()), fans_(mesh.points.size()),
-        first_(mesh.points.size(), kNone) {
+        first_(mesh.points.size(), kNoEdge) {
     for (const LodTriangle& t : mesh.triangles) many_seams_ |= t.kind != mesh.triangles[0].kind;
   }
 
@@ -114,8 +114,8 @@ private:
   uint32_t find_edge(uint32_t p, uint32_t q, uint32_t triangle) {
     const uint32_t a = std::min(p, q), b = std::max(p, q);
     uint32_t found = first_[a];
-    while (found != kNone && out_.ends[found].b != b) found = uses_[found].next;
-    if (found == kNone) {
+    while (found != kNoEdge && out_.ends[found].b != b) found = uses_[found].next;
+    if (found == kNoEdge) {
       found = static_cast<uint32_t>(uses_.size());
       uses_.push_back({std::exchange(first_[a], found), triangle, p == a});
       out_.ends.push_back({a, b});
