@@ -12,8 +12,8 @@ inline constexpr float kMomentUnits = 65535.0f;
 /// Guides store components of normals in these units.
 inline constexpr float kNormalUnit = 1.0f / 16384.0f;
 
-/// Depths of surfaces lie in [kNearestDepth, kFarthestDepth]: they and their reciprocals are normal floats, which GPUs do
-/// not flush to zero.
+/// Depths of surfaces lie in [kNearestDepth, kFarthestDepth]: they and their reciprocals are normal floats, which GPUs
+/// do not flush to zero.
 inline constexpr float kNearestDepth = 0x1p-126f, kFarthestDepth = 0x1p126f;
 
 } // namespace packtrace
