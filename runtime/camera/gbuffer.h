@@ -63,8 +63,8 @@ struct GBuffer {
     for_each_array([&](auto& array, bool kept, auto miss) { array.assign(kept ? new_size.pixels() : 0, miss); });
     previous_z.clear();
   }
-  /// Makes all arrays as long as the image has pixels, for one who writes them. Those that have this length keep their
-  /// values.
+  /// Resizes all arrays that are kept to the image's pixels, for a caller that writes them all. Arrays of the right
+  /// length keep their values.
   void make_room(ImageSize new_size) {
     size = new_size;
     for_each_array([&](auto& array, bool kept, auto) { array.resize(kept ? new_size.pixels() : 0); });

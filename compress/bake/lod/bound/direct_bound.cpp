@@ -22,9 +22,9 @@ constexpr double kSlack = 1.25;    // stops once the largest error left is withi
 // At most max(kFew, 1 / kMeasuredFraction of all triangles) are measured: if more have large errors, tightening them
 // gains little.
 constexpr size_t kFew = 512, kMeasuredFraction = 8;
-// Maximum work per triangle of the group: distances and triangles looked at. Groups of fewer than kLeastWorked
-// triangles, whose lower levels are many times as large, get as much as groups of that many.
-constexpr size_t kWork = 400, kLeastWorked = 256;
+// Maximum work per triangle of the group: distances and triangles looked at. Groups of fewer than
+// kMinWorkTriangles triangles get as much as groups of that many, because their lower levels are many times as large.
+constexpr size_t kWork = 400, kMinWorkTriangles = 256;
 
 /// A convex planar polygon.
 struct Polygon {
@@ -104,7 +104,7 @@ public:
 private:
   /// Limits the work in soups: where every triangle is near all others, more measuring gains little.
   bool spent() const {
-    const size_t triangles = std::max(kLeastWorked, in_.triangles.size() + m_.triangles.size());
+    const size_t triangles = std::max(kMinWorkTriangles, in_.triangles.size() + m_.triangles.size());
     return work_ + refiner_.work() > kWork * triangles;
   }
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSteep = 0.05;               // cosine; steeper triangles count as edge-on
 constexpr double kCoverageRounding = 1e-6;    // tolerance of the coverage, which is an integer
-constexpr double kLeastCoverage = 1e-3;       // by the largest piece, of triangles that stick out over borders
+constexpr double kMinCoverage = 1e-3;         // by the largest piece, of triangles that stick out over borders
 constexpr double kFullCoverage = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
 static_assert(sizeof(DVec3) == 3 * sizeof(double));
 
@@ -155,7 +155,7 @@ bool Overlay::find_point_in(const OverlayPiece& piece, OverlayPoint& out) const 
     out.l1 += share * p.l1, out.l2 += share * p.l2;
     area += p.l1 * q.l2 - p.l2 * q.l1;
   }
-  return area > kLeastCoverage;
+  return area > kMinCoverage;
 }
 
 /// The largest distance, from an open side's candidate, of the overlaid triangle's part that is beyond the side as seen
