@@ -1,16 +1,12 @@
 // The bodies of triangle_distances() and nearest_triangle(), compiled per instruction set with the same operations in
-// the same order, so results are bit-identical. No other header's functions may be compiled for AVX2.
-
-#if defined(__SSE2__)
-#include <immintrin.h>
-#endif
+// the same order, so results are bit-identical. Functions of other headers that are compiled for AVX2 must be inlined and
+// local, as those of lanes.h are.
 
 #include "compress/bake/lod/bound/distance_kernel.h"
+#include "compress/bake/lod/lanes.h"
 
 namespace packtrace {
 namespace {
-
-using Lanes = double __attribute__((vector_size(32)));
 
 struct Vector4 {
   Lanes x, y, z;
@@ -39,18 +35,6 @@ struct Vector4 {
   __builtin_memcpy(&out.y, rows[1], sizeof out.y);
   __builtin_memcpy(&out.z, rows[2], sizeof out.z);
   return out;
-}
-
-[[gnu::always_inline]] inline void root(const Lanes& x, Lanes& out) {
-#if defined(__AVX__)
-  out = _mm256_sqrt_pd(x);
-#elif defined(__SSE2__)
-  const __m128d low = _mm_sqrt_pd(__builtin_shufflevector(x, x, 0, 1));
-  const __m128d high = _mm_sqrt_pd(__builtin_shufflevector(x, x, 2, 3));
-  out = __builtin_shufflevector(low, high, 0, 1, 2, 3);
-#else
-  for (uint64_t lane = 0; lane < 4; ++lane) out[lane] = __builtin_sqrt(x[lane]);
-#endif
 }
 
 [[gnu::always_inline]] inline void distances_to_block(const double* points, uint64_t point_count,
@@ -83,7 +67,7 @@ struct Vector4 {
     dot(d, d, plane2);
     distance2 = inside ? plane2 : distance2;
     Lanes distance;
-    root(distance2, distance);
+    square_root(distance2, distance);
     __builtin_memcpy(out[i] + at, &distance, sizeof distance);
   }
 }
