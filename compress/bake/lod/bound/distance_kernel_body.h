@@ -1,6 +1,6 @@
 // The bodies of triangle_distances() and nearest_triangle(), compiled per instruction set with the same operations in
-// the same order, so results are bit-identical. Functions of other headers that are compiled for AVX2 must be inlined and
-// local, as those of lanes.h are.
+// the same order, so results are bit-identical. Functions of other headers that are compiled for AVX2 must be inlined
+// and local, as those of lanes.h are.
 
 #include "compress/bake/lod/bound/distance_kernel.h"
 #include "compress/bake/lod/lanes.h"
