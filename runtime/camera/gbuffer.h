@@ -112,7 +112,7 @@ struct AoFrame {
   /// no meaning until ViewTracer::read_occlusion() fills them in.
   bool may_stay_on_gpu = false;
   std::shared_ptr<gpu::DeviceAo> on_gpu;
-  /// False: hit_distance is not wanted, and stays empty.
+  /// Whether hit_distance is filled; if not, it stays empty.
   bool with_distances = true;
   /// Longest history in frames, not negative, that a pixel may keep from the frames before, as history_limits() finds
   /// it where something moved. Empty: no limits.

@@ -7,7 +7,7 @@
 
 namespace packtrace {
 
-/// Allocates elements without a value, unless one is given.
+/// Leaves elements uninitialised unless a value is given.
 template <typename T>
 struct PixelAllocator : std::allocator<T> {
   template <typename U>
@@ -24,7 +24,7 @@ struct PixelAllocator : std::allocator<T> {
   }
 };
 
-/// A vector whose resize() adds elements without a value: for pixels that someone writes before they are read.
+/// A vector whose resize() adds uninitialised elements, for pixels that are written before they are read.
 template <typename T>
 using PixelArray = std::vector<T, PixelAllocator<T>>;
 

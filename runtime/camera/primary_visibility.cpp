@@ -55,7 +55,7 @@ public:
       trace_spans(tracer, progress);
   }
 
-  /// Lets the G-buffer begin at this pixel of the image.
+  /// Sets the pixel of the image that the first pixel of the G-buffer stands for.
   void begin_at(uint32_t x, uint32_t y) { left_ = x, top_ = y; }
 
   void trace_tile(const Tile& tile) const {

@@ -44,7 +44,7 @@ public:
   virtual void resize(ImageSize size) = 0;
   /// Sizes are those of the last resize(), and not empty.
   virtual void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) = 0;
-  /// @param with_variance DenoisedAo::variance is wanted; without, it may be that of another frame, or empty
+  /// @param with_variance whether DenoisedAo::variance is read; if false, it may be empty or that of another frame
   virtual const DenoisedAo& denoise(bool with_variance) = 0;
   virtual std::vector<std::byte> save() const = 0;
   virtual void restore(ImageSize size, std::span<const std::byte> bytes) = 0;

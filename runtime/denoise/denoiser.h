@@ -42,7 +42,7 @@ public:
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source = HistorySource::kMotion);
 
   /// The second half of next_frame(): filters a copy of the history. Without a frame, all pixels are misses.
-  /// @param with_variance whether DenoisedAo::variance is wanted. Without, it may be empty or that of another frame.
+  /// @param with_variance whether DenoisedAo::variance is read; if false, it may be empty or that of another frame
   /// @return the result, valid until the next call
   const DenoisedAo& denoise(bool with_variance = true);
 
@@ -55,7 +55,7 @@ public:
   /// Discards all history. Call it at camera cuts.
   void reset();
 
-  /// Frees memory that no result depends on. The next frame that moves, or denoise(), takes it again.
+  /// Frees memory that no result depends on. The next frame that moves, or denoise(), allocates it again.
   void free_spare_memory();
 
   /// Bytes of memory that are held between frames, without the result and without each thread's rows.

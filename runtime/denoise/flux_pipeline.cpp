@@ -43,8 +43,8 @@ private:
   FluxConfig config_;
   bool has_frame_ = false;
   bool pair_guides_outdated_ = false; ///< they do not belong to the guides
-  /// `before_` is used while a frame is added. Until the next one that moves three of its planes are the memory of
-  /// pair_guides_, and it may have no memory.
+  /// Holds the frame before while a frame is added. Afterwards three of its planes store pair_guides_, and the others
+  /// may be freed until the next frame that moves.
   FrameHistory now_, before_;
   Plane<uint32_t> trends_; ///< trend.h
   PairGuides pair_guides_;
@@ -98,7 +98,7 @@ void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistoryS
       now_.history, trends_);
 }
 
-/// Takes memory for the pair guides. What only frames that move need is freed while nothing moves.
+/// Allocates the pair guides. While nothing moves, frees the planes that only moving frames need.
 void FluxPipeline::make_room_for_pairs() {
   Guides& g = before_.guides;
   History& h = before_.history;

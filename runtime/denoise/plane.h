@@ -24,7 +24,7 @@ public:
     stride_ = static_cast<size_t>(size.width) + 2 * kPlaneBorder;
     data_.assign(stride_ * (static_cast<size_t>(size.height) + 2 * kPlaneBorder), T{});
   }
-  /// Gives a plane without memory, or of another size, pixels without a value and a border of zeros.
+  /// Allocates the plane unless it has this size already: pixels are uninitialised, the border is zero.
   void make_room(ImageSize size) {
     const size_t stride = static_cast<size_t>(size.width) + 2 * kPlaneBorder;
     const size_t rows = static_cast<size_t>(size.height) + 2 * kPlaneBorder;

@@ -35,7 +35,7 @@ bool same_camera(const Camera& a, const Camera& b) {
          a.screen_window == b.screen_window && a.width_px == b.width_px && a.height_px == b.height_px;
 }
 
-/// Whether someone reads AoFrame::hit_distance.
+/// Whether AoFrame::hit_distance is read.
 bool needs_distances(const FrameConfig& config, const FrameScene& scene) {
   const bool reference = config.denoise && config.denoiser.kind == DenoiserKind::kReference;
   return config.view_layers || reference || scene.backend.backend == Backend::kGpu;
@@ -128,7 +128,7 @@ SamplePlan FrameLoop::sample_plan(const GBuffer& shaded, std::span<const float> 
 }
 
 /// Adds the frame's occlusion to the history.
-/// @param shaded the surfaces from which its rays start
+/// @param shaded the G-buffer from whose points its rays started
 void FrameLoop::accumulate(const GBuffer& shaded) {
   const Stopwatch accumulating;
   if (!config_.denoise) {

@@ -60,9 +60,9 @@ public:
   /// Goes on with other settings, whose `detail` is not read: levels of detail stay as they are. All frames are
   /// forgotten; trees are kept. Throws as the constructor does.
   void configure(const FrameConfig& config);
-  /// Sets which layers are filled: the plain, surface and cost layers at the next resolve(), for which camera rays are
-  /// traced again if they were traced without what the layers need; views from the next frame on. Also which of the
-  /// shaded views is resolved. Forgets nothing.
+  /// Sets which layers are filled and which shaded view is resolved. Plain, surface and cost layers are filled from the
+  /// next resolve() on, views from the next frame on. Traces the camera rays again where the G-buffer lacks what the
+  /// layers need. Keeps the history.
   void show_layers(const FrameConfig& config);
 
   /// SceneState::follow_motion().
@@ -90,7 +90,7 @@ public:
   const AoDenoiser& denoiser() const { return denoiser_; }
   /// Camera rays of the last frame that traced any.
   const GBuffer& gbuffer() const { return gbuffer_; }
-  /// What the camera ray of a traced pixel hit in the last frame that traced any; needs one. It is traced again.
+  /// Traces the camera ray of a pixel of the last traced frame again and returns its hit. Needs a frame.
   std::optional<CameraHit> hit_at(uint32_t x, uint32_t y) const;
 
 private:

@@ -84,8 +84,8 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
   }
 }
 
-/// Traces the camera rays of a still view's frames again, up to that of a number, and adds them to the layers.
-/// @param plans the first one chooses levels of detail, as the frame that moved did
+/// Traces the camera rays of still frames 0 to `frames` again and adds them to the layers.
+/// @param plans whether frame 0 chooses levels of detail, as a frame that moves does
 void FrameLoop::trace_still(const Camera& camera, uint32_t frames, bool plans) {
   layers_.clear();
   Progress unseen;
@@ -107,8 +107,8 @@ const GBuffer& FrameLoop::shaded_surfaces() const {
   return config_.ao_resolution == AoResolution::kQuarter ? half_.gbuffer : gbuffer_;
 }
 
-/// Traces camera rays again if they were traced without channels that are needed now.
-/// @param points occlusion rays will be traced
+/// Traces the camera rays again if the G-buffer lacks channels that are needed now.
+/// @param points whether the points from which occlusion rays start are needed, too
 void FrameLoop::require_surfaces(bool points) {
   const uint32_t needed = channels_ | gbuffer_channels(config_);
   if (!camera_ || (needed == channels_ && (!points || shaded_surfaces().has_points()))) return;

@@ -17,7 +17,7 @@ public:
   void clear() { frames_ = 0; }
 
   /// Adds a frame. Its size must be that of the other frames since clear(). The first frame takes no memory: it is read
-  /// from its G-buffer. If it has albedo and material, the others must have them, too; else there is no mean albedo.
+  /// from its G-buffer. Later frames need albedo and material if it has them; else there is no mean albedo.
   void add(const GBuffer& gbuffer, std::span<const Material> materials);
   /// Makes the sums of the first frame, before its G-buffer changes.
   void keep(const GBuffer& first);
@@ -65,7 +65,7 @@ private:
   std::vector<float> hits_;           ///< number of frames in which the pixel's camera ray hit
   std::vector<float> depth_;          ///< sums over hits
   std::vector<Vec3> normal_, albedo_; ///< albedo_ is empty without albedo
-  std::vector<uint32_t> instance_;    ///< of the first hit
+  std::vector<uint32_t> instance_;    ///< of each pixel's first hit
   // Empty if no material emits light, and without albedo.
   std::vector<float> emitters_;      ///< number of hits on emitters
   std::vector<Vec3> emitter_albedo_; ///< part of albedo_ that belongs to emitters

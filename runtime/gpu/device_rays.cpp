@@ -61,7 +61,7 @@ struct DeviceRays::State {
   std::shared_ptr<Device> device;
   CameraRecord camera{};
   Buffer cameras, hits, rays, counts, sums;
-  Buffer spare_counts; ///< of dispatches that only measure
+  Buffer spare_counts; ///< of dispatches that only compare kernels
   StagedBuffer points, view, film;
   uint32_t point_count = 0;
   std::unique_ptr<Kernel> camera_kernel, view_kernel, points_kernel, rays_kernel, nearest_kernel;
@@ -83,7 +83,7 @@ struct DeviceRays::State {
     points = StagedBuffer();
     with_slack(bytes, [&](uint64_t all) { points = StagedBuffer(device, all, "points"); });
   }
-  /// Returns false if there is no memory for them.
+  /// Allocates spare_counts. Returns false if device memory does not suffice.
   bool make_spare_counts() {
     try {
       make_room(spare_counts, counts.bytes(), "counts");
@@ -262,7 +262,7 @@ DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watc
   s.make_count_kernels();
   FasterKernel& faster = s.faster[samples.order];
   Kernel* const kernels[] = {s.walk_kernel.get(), s.queue_kernel.get()};
-  double spare_ms = 0.0; // of dispatches that only measure
+  double spare_ms = 0.0; // of dispatches that only compare kernels
   const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
     const uint64_t rays = uint64_t{part.point_count} * part.sample_count;
     const GpuCounting counting = s.device->config().counting;

@@ -70,7 +70,7 @@ private:
 /// then.
 class FasterKernel {
 public:
-  /// Whether the next dispatch is to be run with both kernels, and their times given to add().
+  /// Whether to run the next dispatch with both kernels and to pass their times to add().
   bool compares(uint64_t rays) {
     const size_t turn = trials_[std::bit_width(rays)].dispatches++;
     return turn == 0 || turn == kSecondTurn || turn % kTurns == 0;

@@ -17,7 +17,7 @@ constexpr double kSumError = 0x1p-22;
 constexpr int kMinExponent = -100, kMaxExponent = 22;
 constexpr double kMaxByte = 255.0;
 
-/// Planes of a node along an axis.
+/// Origin and unit of a node's quantised planes along an axis.
 struct Axis {
   float origin;
   int exponent;

@@ -81,7 +81,7 @@ void PaneRenderer::restart() { loop_->reset(); }
 void PaneRenderer::next_frame(const Camera& camera, double time_s, bool passing, Progress& progress) {
   report_ = {};
   loop_->expect_movement(passing);
-  if (passing) image_ = {}; // its memory serves camera rays
+  if (passing) image_ = {}; // frees memory before camera rays are traced
   report_.add(loop_->next_frame(camera, time_s, progress));
 }
 

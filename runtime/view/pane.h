@@ -51,7 +51,7 @@ public:
   void restart();
 
   /// Renders a frame. Throws like FrameLoop::next_frame().
-  /// @param passing the next frame does not continue its still picture: FrameLoop::expect_movement()
+  /// @param passing whether the next frame begins a new picture: FrameLoop::expect_movement()
   void next_frame(const Camera& camera, double time_s, bool passing, Progress& progress);
   /// Writes image() from the frames so far, with the layers of the configuration.
   void resolve();

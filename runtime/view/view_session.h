@@ -134,7 +134,7 @@ public:
   /// Renders the next frame of all panes that are shown. Returns false if the observer of the progress ended it by
   /// Error(kCancelled); the still picture then begins again. Throws like FrameLoop::next_frame(), and MemoryError.
   bool step(Progress& progress);
-  /// Does the same for a still picture of one frame: the next one begins anew. This takes less memory.
+  /// step() for a still picture of one frame: the next step begins a new picture, which needs less memory.
   bool step_once(Progress& progress);
   /// Renders a frame if something has changed since the last one, so that the picture shows it. Returns like step().
   bool settle(Progress& progress) { return moved_ || changed_ || last_.report.frames == 0 ? step(progress) : true; }
@@ -149,7 +149,7 @@ public:
   // The result of the frames so far; needs a step() before.
   /// The image of a pane with all plain layers; of the first one for a pane that is not shown.
   const RenderedImage& image(size_t pane);
-  /// Does the same with the layers that are shown alone, which takes less memory.
+  /// image() with only the layers that are shown, which needs less memory.
   const RenderedImage& shown_image(size_t pane);
   /// The settings with which it was rendered.
   const FrameConfig& rendered_config(size_t pane) const;

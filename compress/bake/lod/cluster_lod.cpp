@@ -164,7 +164,7 @@ private:
             const Triangle& t = lod_.triangles[c.range.first_triangle + i];
             std::atomic_ref<uint32_t> owner(owner_[lod_.vertices[t[corner]].position]);
             uint32_t expected = owner.load(std::memory_order_relaxed);
-            if (expected == group || expected == kShared) continue; // mostly; exchanges take several times as long
+            if (expected == group || expected == kShared) continue; // the usual case; an exchange costs several loads
             expected = kNoCluster;
             if (!owner.compare_exchange_strong(expected, static_cast<uint32_t>(group), std::memory_order_relaxed) &&
                 expected != group)

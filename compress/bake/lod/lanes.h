@@ -12,6 +12,23 @@ namespace {
 using Lanes = double __attribute__((vector_size(32)));
 using Row = double __attribute__((vector_size(32), may_alias, aligned(8))); // lanes as stored in memory
 
+/// Four vectors.
+struct Vector4 {
+  Lanes x, y, z;
+};
+
+[[gnu::always_inline]] inline Vector4 load(const double (&rows)[3][4]) {
+  Vector4 out;
+  __builtin_memcpy(&out.x, rows[0], sizeof out.x);
+  __builtin_memcpy(&out.y, rows[1], sizeof out.y);
+  __builtin_memcpy(&out.z, rows[2], sizeof out.z);
+  return out;
+}
+
+[[gnu::always_inline]] inline void dot(const Vector4& a, const Vector4& b, Lanes& out) {
+  out = a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
 [[gnu::always_inline]] inline void transpose(Lanes& v0, Lanes& v1, Lanes& v2, Lanes& v3) {
   const Lanes a = __builtin_shufflevector(v0, v1, 0, 4, 2, 6), b = __builtin_shufflevector(v0, v1, 1, 5, 3, 7);
   const Lanes c = __builtin_shufflevector(v2, v3, 0, 4, 2, 6), d = __builtin_shufflevector(v2, v3, 1, 5, 3, 7);

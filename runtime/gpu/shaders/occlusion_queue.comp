@@ -175,7 +175,7 @@ void main() {
     bool walking;
     do {
       walking = tracing && held == 0u && way.next == kNoPlacement;
-      // Leaves that wait are tested with the ray in the grid of its placement, so it enters no other until then.
+      // A ray's queued leaves are tested in the grid of its placement, so it enters the next one only after the tests.
       bool entering = kManyPlacements && tracing && way.next != kNoPlacement && !pending;
       bool enters = kManyPlacements && // what most lanes can do; the others wait
                     bitCount(subgroupBallot(entering).x) > bitCount(subgroupBallot(walking).x);

@@ -44,7 +44,7 @@ TEST(Overlay, BoundsTrianglesThatStickOutOverBorders) {
   const Surface coarse = bumpy_square(7, 5.0f, 3), fine = bumpy_square(11, 5.0f, 4);
   Random random(12);
   Overlay overlay(coarse.view());
-  size_t found = 0, beyond = 0; // triangles; samples that are bounded only by what lies beyond a border
+  size_t found = 0, beyond = 0; // triangles with an overlay; samples that only pieces beyond a border bound
   for (size_t repeat = 0; repeat < 20; ++repeat) {
     std::vector<uint32_t> some = coarse.all();
     std::erase_if(some, [&](uint32_t) { return random.uniform(0, 1) < 0.3f; });

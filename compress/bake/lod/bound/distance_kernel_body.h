@@ -8,14 +8,6 @@
 namespace packtrace {
 namespace {
 
-struct Vector4 {
-  Lanes x, y, z;
-};
-
-[[gnu::always_inline]] inline void dot(const Vector4& a, const Vector4& b, Lanes& out) {
-  out = a.x * b.x + a.y * b.y + a.z * b.z;
-}
-
 /// Updates `least` with the squared distance from a segment that starts at the origin of p. `along` is dot(p, segment)
 /// / |segment|^2.
 [[gnu::always_inline]] inline void to_segment(const Vector4& p, const Vector4& segment, const Lanes& along,
@@ -27,14 +19,6 @@ struct Vector4 {
   Lanes distance2;
   dot(d, d, distance2);
   least = distance2 < least ? distance2 : least;
-}
-
-[[gnu::always_inline]] inline Vector4 load(const double (&rows)[3][4]) {
-  Vector4 out;
-  __builtin_memcpy(&out.x, rows[0], sizeof out.x);
-  __builtin_memcpy(&out.y, rows[1], sizeof out.y);
-  __builtin_memcpy(&out.z, rows[2], sizeof out.z);
-  return out;
 }
 
 [[gnu::always_inline]] inline void distances_to_block(const double* points, uint64_t point_count,

@@ -33,7 +33,7 @@ struct OverlayPolygon {
 class Overlay {
 public:
   explicit Overlay(const OverlaySurface& surface = {});
-  /// Continues with another surface and keeps the memory.
+  /// Replaces the surface. Keeps the allocated memory.
   void reset(const OverlaySurface& surface) { surface_ = surface, corners_.clear(); }
 
   /// Appends the pieces to `pieces` and returns true if the candidates are known to cover the triangle: each candidate
@@ -43,11 +43,11 @@ public:
   bool overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
                std::vector<OverlayPiece>& pieces);
 
-  /// Bounds the triangle of the last overlay() even where no candidate covers it, as where borders moved, using only
-  /// pieces that are near enough. A segment from a point that none of these covers to a covered point enters them
-  /// through an open side, so what lies beyond the open sides, as seen from one covered point, is all that they do not
-  /// cover. Each of these parts is measured to its side's candidate and appended as a further piece. Returns false, and
-  /// leaves `pieces` unchanged, if a part is too far away or hardly anything is covered.
+  /// Bounds the triangle of the last overlay() even where candidates leave parts of it uncovered, as where borders
+  /// moved. Uses only pieces that `accept` takes. A segment from an uncovered to a covered point enters the pieces
+  /// through an open side. So the parts beyond the open sides, seen from one covered point, contain all that is not
+  /// covered. The distance of each part from its side's candidate is measured, and the part is appended as a piece.
+  /// Returns false, and leaves `pieces` unchanged, if a part is not accepted or hardly anything is covered.
   /// @param accept (candidate, distance): whether that distance is near enough
   template <typename Accept>
   bool overlay_near(const Accept& accept, std::vector<OverlayPiece>& pieces) {
@@ -74,7 +74,7 @@ public:
     pieces.insert(pieces.end(), near_.begin(), near_.end());
     return true;
   }
-  /// The same with all pieces, whatever their distances.
+  /// overlay_near() that accepts every distance.
   bool overlay_over_borders(std::vector<OverlayPiece>& pieces) {
     return overlay_near([](uint32_t, double) { return true; }, pieces);
   }
@@ -83,7 +83,7 @@ public:
   double nearest_distance(const OverlayPiece& piece) const;
 
 private:
-  /// A candidate side through the triangle's interior without another candidate behind it.
+  /// A candidate's side that crosses the triangle's interior and has no candidate on its other side.
   struct OpenSide {
     uint32_t from, to, triangle;
   };

@@ -92,7 +92,7 @@ double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, doub
   return std::min(by_overlay, by_cutting);
 }
 
-/// Bounds the part by an overlay, in mapped_triangles_. Returns false if the candidates cover none of it.
+/// Overlays the part on the candidates and writes the pieces to mapped_triangles_. Returns false if none covers it.
 bool UncoveredBound::overlay(const Corners& part, double& stated) {
   mapped_triangles_.clear();
   const DVec3 normal = glm::cross(part[1] - part[0], part[2] - part[0]);

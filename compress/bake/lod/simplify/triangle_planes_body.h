@@ -8,19 +8,11 @@
 namespace packtrace {
 namespace {
 
-struct Side4 {
-  Lanes x, y, z;
-};
-
-[[gnu::always_inline]] inline void inner_product(const Side4& a, const Side4& b, Lanes& out) {
-  out = a.x * b.x + a.y * b.y + a.z * b.z;
-}
-
 /// The unit vector from a to b.
-[[gnu::always_inline]] inline void unit_side(const Side4& a, const Side4& b, Side4& out) {
-  const Side4 d = {b.x - a.x, b.y - a.y, b.z - a.z};
+[[gnu::always_inline]] inline void unit_side(const Vector4& a, const Vector4& b, Vector4& out) {
+  const Vector4 d = {b.x - a.x, b.y - a.y, b.z - a.z};
   Lanes length;
-  inner_product(d, d, length);
+  dot(d, d, length);
   square_root(length, length);
   const Lanes scale = Lanes{} + 1.0;
   const Lanes inverse = scale / length;
@@ -34,11 +26,11 @@ struct Side4 {
 
 /// What a corner between two sides adds to its point, one row per triangle.
 /// @param from, to unit vectors along the sides that start and end at the corner
-[[gnu::always_inline]] inline void add_corner(const Side4& from, const Side4& to, Lanes* rows) {
+[[gnu::always_inline]] inline void add_corner(const Vector4& from, const Vector4& to, Lanes* rows) {
   constexpr double kPi = 3.141592653589793;
   const Lanes zero = {};
   Lanes cosine;
-  inner_product(from, to, cosine);
+  dot(from, to, cosine);
   cosine = -cosine;
   Lanes half_sine = 0.5 - 0.5 * cosine, half_cosine = 0.5 + 0.5 * cosine;
   half_sine = half_sine > zero ? half_sine : zero, half_cosine = half_cosine > zero ? half_cosine : zero;
@@ -56,13 +48,13 @@ struct Side4 {
 }
 
 /// The quadrics of triangles, weighted by area: rows 0 to 2 of CollapsePoint, four triangles each.
-[[gnu::always_inline]] inline void plane_rows(const Side4& normal, const Lanes& area, const Side4& at,
+[[gnu::always_inline]] inline void plane_rows(const Vector4& normal, const Lanes& area, const Vector4& at,
                                               Lanes (&rows)[3][4]) {
-  const Side4 n = {normal.x / area, normal.y / area, normal.z / area};
+  const Vector4 n = {normal.x / area, normal.y / area, normal.z / area};
   Lanes d;
-  inner_product(n, at, d);
+  dot(n, at, d);
   d = -d;
-  const Side4 w = {area * n.x, area * n.y, area * n.z};
+  const Vector4 w = {area * n.x, area * n.y, area * n.z};
   rows[0][0] = w.x * n.x, rows[0][1] = w.x * n.y, rows[0][2] = w.x * n.z, rows[0][3] = w.y * n.y;
   rows[1][0] = w.y * n.z, rows[1][1] = w.z * n.z, rows[1][2] = w.x * d, rows[1][3] = w.y * d;
   rows[2][0] = w.z * d, rows[2][1] = area * d * d, rows[2][2] = area, rows[2][3] = Lanes{};
@@ -83,19 +75,17 @@ struct Side4 {
         for (int axis = 0; axis < 3; ++axis)
           at[k][axis][lane] = task.points[uint64_t{3} * corners[lane][k] + static_cast<uint64_t>(axis)];
     }
-    Side4 p[3];
-    for (int k = 0; k < 3; ++k)
-      p[k] = {*reinterpret_cast<const Row*>(at[k][0]), *reinterpret_cast<const Row*>(at[k][1]),
-              *reinterpret_cast<const Row*>(at[k][2])};
-    const Side4 ab = {p[1].x - p[0].x, p[1].y - p[0].y, p[1].z - p[0].z};
-    const Side4 ac = {p[2].x - p[0].x, p[2].y - p[0].y, p[2].z - p[0].z};
-    const Side4 normal = {ab.y * ac.z - ac.y * ab.z, ab.z * ac.x - ac.z * ab.x, ab.x * ac.y - ac.x * ab.y};
+    Vector4 p[3];
+    for (int k = 0; k < 3; ++k) p[k] = load(at[k]);
+    const Vector4 ab = {p[1].x - p[0].x, p[1].y - p[0].y, p[1].z - p[0].z};
+    const Vector4 ac = {p[2].x - p[0].x, p[2].y - p[0].y, p[2].z - p[0].z};
+    const Vector4 normal = {ab.y * ac.z - ac.y * ab.z, ab.z * ac.x - ac.z * ab.x, ab.x * ac.y - ac.x * ab.y};
     Lanes area;
-    inner_product(normal, normal, area);
+    dot(normal, normal, area);
     square_root(area, area);
     Lanes quadrics[3][4], fans[3][4];
     plane_rows(normal, area, p[0], quadrics);
-    Side4 sides[3];
+    Vector4 sides[3];
     for (int k = 0; k < 3; ++k) unit_side(p[k], p[(k + 1) % 3], sides[k]);
     for (int k = 0; k < 3; ++k) add_corner(sides[k], sides[(k + 2) % 3], fans[k]);
     for (uint64_t lane = 0; lane < lanes; ++lane) {
