@@ -3,7 +3,7 @@
 // and local, as those of lanes.h are.
 
 #include "compress/bake/lod/bound/distance_kernel.h"
-#include "compress/bake/lod/lanes.h"
+#include "compress/bake/lod/simplify/lanes.h"
 
 namespace packtrace {
 namespace {

@@ -1,8 +1,8 @@
 // Places edge collapses, four edges in SIMD lanes. Compiled per instruction set with the same operations in the same
 // order, so results are bit-identical. No functions of headers other than lanes.h may be compiled for AVX2.
 
-#include "compress/bake/lod/lanes.h"
 #include "compress/bake/lod/simplify/edge_placement.h"
+#include "compress/bake/lod/simplify/lanes.h"
 
 namespace packtrace {
 namespace {

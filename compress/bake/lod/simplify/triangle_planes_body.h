@@ -2,7 +2,7 @@
 // with the same operations in the same order, so results are bit-identical. No functions of headers other than lanes.h
 // may be compiled for AVX2.
 
-#include "compress/bake/lod/lanes.h"
+#include "compress/bake/lod/simplify/lanes.h"
 #include "compress/bake/lod/simplify/triangle_planes.h"
 
 namespace packtrace {
