@@ -99,10 +99,8 @@ private:
 
   void update_trends(const float* valid, const float* mean, const float* samples, float longest,
                      uint32_t* trend) const {
-    if (!kernels_.any_crosses(width_, valid, samples, longest)) return;
-    for (int x = 0; x < width_; ++x)
-      if (valid[x] > 0.0f && samples[x] < longest && crosses_power_of_two(samples[x]))
-        trend[x] = next_trend(trend[x], mean[x], samples[x]);
+    const auto next = [&](int x) { return kernels_.next_crossing(x, width_, valid, samples, longest); };
+    for (int x = next(0); x < width_; x = next(x + 1)) trend[x] = next_trend(trend[x], mean[x], samples[x]);
   }
 
   const HistoryKernels& kernels_;

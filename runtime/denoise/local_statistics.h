@@ -8,7 +8,7 @@
 
 namespace packtrace {
 
-/// Computes statistics of the windows around pixels, for rows in ascending order, with separable box filters. Each row
+/// Computes sums over the windows around pixels, for rows in ascending order, with separable box filters. Each row
 /// is summed along x once; a ring buffer keeps the sums of the rows of the window. Use one object per thread.
 class LocalStatisticsRows {
 public:
@@ -23,16 +23,16 @@ public:
   void add(const SampleRow& samples);
   /// Adds a row outside the image.
   void add_nothing();
-  /// Returns the statistics of the row in the middle of the last window() rows added, valid until the next call.
-  LocalRow finish();
+  /// Returns the sums over the windows of the row in the middle of the last rows added, valid until the next call.
+  WindowSums finish();
 
 private:
   WindowSums sums(int slot);
 
   const HistoryKernels& kernels_;
   int width_, radius_, next_ = 0;
-  std::vector<float> ring_;   // [slot][quantity][x]
-  std::vector<float> result_; // [quantity][x]
+  size_t stride_;           // of rows, in pixels
+  std::vector<float> ring_; // [slot][quantity][x]; the last slot has the sums over windows
 };
 
 } // namespace packtrace

@@ -49,8 +49,6 @@ public:
   const float* weights() const { return weights_; }
 
 private:
-  void look_nearby(const MotionFrame& frame, int y);
-
   const FluxConfig& config_;
   const HistoryKernels& kernels_;
   int width_;

@@ -50,6 +50,18 @@ struct LocatedRow {
   float* longest;                 ///< longest history in frames
 };
 
+/// Pixels up to `end` that moved by the same offset; those without history belong to any run.
+struct Run {
+  int end;
+  int32_t offset; ///< kNoOffset if all are without history
+};
+
+/// What becomes of histories from nearby pixels.
+struct NearbyTerms {
+  float share;   ///< of their length that is kept
+  float longest; ///< in frames
+};
+
 /// The planes of the previous frame, at a pixel.
 struct PreviousPixels {
   const float* disparity;
@@ -90,18 +102,10 @@ struct SampleRow {
   float* change; ///< fast minus slow history, both including this sample
 };
 
-/// Sums along x over the window, or over 3 pixels (narrow).
+/// Sums along x over the window, or over 3 pixels (narrow); or over whole windows: number of samples, their sum, sum of
+/// their squares, and sum of SampleRow::change.
 struct WindowSums {
   float *count, *sum, *squares, *change, *narrow_count, *narrow_change;
-};
-
-/// Statistics of the windows around the pixels of one row.
-struct LocalRow {
-  float* count;         ///< number of samples in the window
-  float* variance;      ///< variance of the samples, Bessel-corrected; 0 for fewer than two samples
-  float* change;        ///< mean of SampleRow::change
-  float* narrow_count;  ///< number of samples in the 3 x 3 window
-  float* narrow_change; ///< mean of SampleRow::change in the 3 x 3 window
 };
 
 struct CorrectTerms {
@@ -124,6 +128,16 @@ struct HistoryKernels {
                       const PastRow& out, float* weights),
              kMaxNormalSquarings + 1>
       resample;
+  /// Replaces the history of pixel x by the weighted mean of those of the surface's nearby pixels, if there are any; by
+  /// the number of squarings.
+  /// @param from the previous frame at the beginning of the row plus the pixel's offset
+  std::array<void (*)(int x, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
+                      const NearbyTerms& terms, const PastRow& out),
+             kMaxNormalSquarings + 1>
+      look_nearby;
+  /// The run of pixels from x on.
+  /// @param offsets LocatedRow::offset, followed by kRunPadding pixels
+  Run (*next_run)(int x, int width, const int32_t* offsets);
   /// The first pixel from x on, before `width`, that lost its history; or `width`.
   /// @param weights total weight of each pixel in its resampled footprint, as resample() leaves it
   int (*next_lost)(int x, int width, const float* weights, const float* disparity);
@@ -136,15 +150,16 @@ struct HistoryKernels {
   /// @param motion x and y of each pixel's motion in pixels
   /// @param weights total weight of each pixel in its resampled footprint, as resample() leaves it
   void (*keep_trends)(int width, const float* motion, const float* samples, const float* weights, uint32_t* trend);
-  /// Whether a pixel's sample made its history, shorter than `longest`, reach or cross a power of two.
-  bool (*any_crosses)(int width, const float* valid, const float* samples, float longest);
+  /// The first pixel from x on, before `width`, whose sample made its history, shorter than `longest`, reach or cross a
+  /// power of two; or `width`.
+  int (*next_crossing)(int x, int width, const float* valid, const float* samples, float longest);
   /// Sums along x, by the window's radius. Samples are read up to the radius outside the row.
   std::array<void (*)(int width, const SampleRow& samples, const WindowSums& sums), kMaxWindowRadius + 1> sum;
-  /// Statistics of windows, by their radius.
+  /// Sums over windows, by their radius. All rows are followed by kRunPadding pixels.
   /// @param rows sums of the window's rows, from top to bottom
-  std::array<void (*)(int width, const WindowSums* rows, const LocalRow& local), kMaxWindowRadius + 1> finish;
+  std::array<void (*)(int width, const WindowSums* rows, const WindowSums& windows), kMaxWindowRadius + 1> add_windows;
   /// Corrects a row of the history in place. Trends of corrected pixels become unknown.
-  void (*correct)(int width, const LocalRow& local, const CorrectTerms& terms, const HistoryRow& history,
+  void (*correct)(int width, const WindowSums& windows, const CorrectTerms& terms, const HistoryRow& history,
                   uint32_t* trend);
 };
 

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 #if defined(__AVX2__)
 #include <immintrin.h>
@@ -32,37 +34,78 @@ using I32 __attribute__((vector_size(4 * kFloats))) = int32_t;
 inline U16 all(uint16_t value) { return U16{} + value; }
 inline F32 all(float value) { return F32{} + value; }
 
-inline U16 load(const uint16_t* from) {
-  U16 v;
+/// The vector of the lanes that an element of memory fills.
+template <typename T>
+struct LanesOf;
+template <>
+struct LanesOf<uint16_t> {
+  using Type = U16;
+};
+template <>
+struct LanesOf<int16_t> {
+  using Type = I16;
+};
+template <>
+struct LanesOf<float> {
+  using Type = F32;
+};
+template <>
+struct LanesOf<uint32_t> {
+  using Type = I32;
+};
+template <>
+struct LanesOf<int32_t> {
+  using Type = I32;
+};
+
+template <typename T>
+inline auto load(const T* from) {
+  typename LanesOf<T>::Type v;
   std::memcpy(&v, from, sizeof(v));
   return v;
 }
-inline I16 load(const int16_t* from) {
-  I16 v;
-  std::memcpy(&v, from, sizeof(v));
+template <typename T>
+inline void store(T* to, typename LanesOf<T>::Type v) {
+  std::memcpy(to, &v, sizeof(v));
+}
+/// Loads and stores the first `count` lanes only, or all if there are fewer; other lanes are 0.
+template <typename T>
+inline auto load_first(int count, const T* from) {
+  typename LanesOf<T>::Type v{};
+  if (count >= static_cast<int>(sizeof(v) / sizeof(T))) return load(from);
+  if (count > 0) std::memcpy(&v, from, static_cast<size_t>(count) * sizeof(T));
   return v;
 }
-inline F32 load(const float* from) {
-  F32 v;
-  std::memcpy(&v, from, sizeof(v));
-  return v;
+template <typename T>
+inline void store_first(int count, T* to, typename LanesOf<T>::Type v) {
+  if (count >= static_cast<int>(sizeof(v) / sizeof(T)))
+    store(to, v);
+  else
+    std::memcpy(to, &v, static_cast<size_t>(count) * sizeof(T));
 }
-inline I32 load(const uint32_t* from) {
-  I32 v;
-  std::memcpy(&v, from, sizeof(v));
-  return v;
+
+template <size_t... kLane>
+constexpr I32 numbers(std::index_sequence<kLane...>) {
+  return I32{static_cast<int32_t>(kLane)...};
 }
-inline void store(float* to, F32 v) { std::memcpy(to, &v, sizeof(v)); }
+constexpr I32 kEachLane = numbers(std::make_index_sequence<kFloats>()); ///< 0, 1, 2 ...
+/// Every second lane of two vectors.
+inline F32 even_lanes(F32 a, F32 b) { return __builtin_shuffle(a, b, 2 * kEachLane); }
+inline F32 odd_lanes(F32 a, F32 b) { return __builtin_shuffle(a, b, 2 * kEachLane + 1); }
+
+inline I32 both(I32 a, I32 b) { return a & b; }
 inline F32 select(I32 condition, F32 a, F32 b) { return condition ? a : b; }
 inline F32 as_floats(I32 v) { return __builtin_convertvector(v, F32); }
 inline I32 truncated(F32 v) { return __builtin_convertvector(v, I32); }
-inline void store(uint16_t* to, U16 v) { std::memcpy(to, &v, sizeof(v)); }
-inline void store(int16_t* to, I16 v) { std::memcpy(to, &v, sizeof(v)); }
+inline I32 rounded_down(F32 v) {
+  const I32 towards_zero = truncated(v);
+  return towards_zero + (as_floats(towards_zero) > v); // true is -1
+}
 
 // lesser, greater; average: of two lanes, rounded up; product: the upper half, which is the product of fractions in
 // units of 2^-16; part_of: the product of a fraction in units of 2^-15 and a value, rounded to nearest. load_wide:
 // of kFloats values; store_bytes, store_words: of values that fit; any: whether a comparison is true in any lane;
-// sum_of_products: of both 16-bit halves.
+// any_greater: likewise; root: square root; sum_of_products: of both 16-bit halves.
 #if defined(__AVX512BW__)
 inline U16 lesser(U16 a, U16 b) { return (U16)_mm512_min_epu16((__m512i)a, (__m512i)b); }
 inline U16 greater(U16 a, U16 b) { return (U16)_mm512_max_epu16((__m512i)a, (__m512i)b); }
@@ -85,6 +128,8 @@ inline I32 load_wide(const uint16_t* from) {
 }
 inline I32 sum_of_products(I32 a, I32 b) { return (I32)_mm512_madd_epi16((__m512i)a, (__m512i)b); }
 inline bool any(I32 condition) { return _mm512_test_epi32_mask((__m512i)condition, (__m512i)condition) != 0; }
+inline bool any_greater(F32 a, F32 b) { return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_GT_OQ) != 0; }
+inline F32 root(F32 a) { return (F32)_mm512_maskz_sqrt_ps(kEach, (__m512)a); }
 template <typename T>
 inline void store_words(T* to, I32 v) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm512_maskz_cvtepi32_epi16(kEach, (__m512i)v));
@@ -113,6 +158,10 @@ inline I32 load_wide(const uint16_t* from) {
 }
 inline I32 sum_of_products(I32 a, I32 b) { return (I32)_mm256_madd_epi16((__m256i)a, (__m256i)b); }
 inline bool any(I32 condition) { return _mm256_testz_si256((__m256i)condition, (__m256i)condition) == 0; }
+inline bool any_greater(F32 a, F32 b) {
+  return _mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_GT_OQ)) != 0;
+}
+inline F32 root(F32 a) { return (F32)_mm256_sqrt_ps((__m256)a); }
 template <typename T>
 inline void store_words(T* to, I32 v) {
   _mm_storeu_si128(reinterpret_cast<__m128i*>(to),
@@ -168,6 +217,12 @@ inline bool any(I32 condition) {
   for (int i = 0; i < kFloats; ++i) found |= condition[i];
   return found != 0;
 }
+inline bool any_greater(F32 a, F32 b) { return any(a > b); }
+inline F32 root(F32 a) {
+  F32 v{};
+  for (int i = 0; i < kFloats; ++i) v[i] = std::sqrt(a[i]);
+  return v;
+}
 template <typename T>
 inline void store_words(T* to, I32 v) {
   for (int i = 0; i < kFloats; ++i) to[i] = static_cast<T>(v[i]);
@@ -176,6 +231,18 @@ inline void store_bytes(uint8_t* to, I32 v) {
   for (int i = 0; i < kFloats; ++i) to[i] = static_cast<uint8_t>(v[i]);
 }
 #endif
+
+/// Pairs of 16-bit numbers, for sum_of_products.
+inline I32 load_pairs(const int16_t* low, const int16_t* high) {
+  return load_wide(reinterpret_cast<const uint16_t*>(low)) | (load_wide(high) << 16);
+}
+/// store_words() of the first `count` lanes only, or of all if there are fewer.
+inline void store_first_words(int count, uint16_t* to, I32 v) {
+  if (count >= kFloats) return store_words(to, v);
+  uint16_t words[kFloats];
+  store_words(words, v);
+  std::memcpy(to, words, static_cast<size_t>(count) * sizeof(*to));
+}
 
 } // namespace
 } // namespace packtrace

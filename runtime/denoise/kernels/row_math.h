@@ -18,9 +18,8 @@ inline float greater(float a, float b) { return a < b ? b : a; }
 /// Convert moments from and to units of 1 / kMomentUnits. NaN becomes 0.
 inline float moment_of(uint16_t units) { return static_cast<float>(static_cast<int>(units)) * (1.0f / kMomentUnits); }
 inline F32 moments_of(I32 units) { return as_floats(units) * (1.0f / kMomentUnits); }
-inline uint16_t in_moment_units(float moment) {
-  const float bounded = lesser(greater(0.0f, moment), 1.0f);
-  return static_cast<uint16_t>(static_cast<int>(bounded * kMomentUnits + 0.5f));
+inline I32 in_moment_units(F32 moment) {
+  return truncated(lesser(greater(all(0.0f), moment), all(1.0f)) * kMomentUnits + 0.5f);
 }
 
 } // namespace

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Corrects the history where the fast one shows a change: sum_windows(), finish_windows() and correct_row() of
+// Corrects the history where the fast one shows a change: sum_windows(), add_windows() and correct_row() of
 // runtime/denoise/kernels/history_rows_body.h.
 #include "denoise.glsl"
 

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Loads a frame's guides, resamples the history where things move, and adds the frame's samples: locate_pixels(),
-// interpolate_run(), sharpen_run(), accumulate_row() and keep_trends_row() of runtime/denoise/kernels/history_rows_body.h.
+// interpolate_run(), sharpen_run() and look_nearby() of runtime/denoise/kernels/resample_rows_body.h, accumulate_row() and
+// keep_trends_row() of history_rows_body.h.
 #include "denoise.glsl"
 
 layout(constant_id = 2) const uint kSquarings = 2u; // that raise cosines to their power

@@ -65,6 +65,22 @@ TEST(AoDenoiser, OneDamagedTexelStaysOneTexelAndHealsInTwoFrames) {
     }
 }
 
+TEST(AoDenoiser, SurfacesThatWereBehindTheCameraStartAnew) {
+  for (const float depth : {-3.0f, 0.0f, 1e-42f, kNan, kInfinity}) {
+    AoDenoiser denoiser;
+    for (uint32_t f = 0; f < 4; ++f) {
+      GBuffer g = wall(kOddSize);
+      for (size_t i = 0; i < kOddSize.pixels(); ++i)
+        g.view_z[i] = 20.0f + 0.5f * static_cast<float>(i % kOddSize.width), g.motion_px[i] = Vec2(0.5f, 0.0f);
+      g.previous_z = g.view_z;
+      for (size_t i = 0; i < kOddSize.pixels(); i += 3) g.previous_z[i] = depth;
+      const DenoisedAo& result = denoiser.next_frame(g, noise(kOddSize, 0.4f, f));
+      expect_sound(result);
+      for (size_t i = 0; i < kOddSize.pixels(); i += 3) ASSERT_EQ(result.tspp[i], 1.0f) << "previous depth " << depth;
+    }
+  }
+}
+
 TEST(AoDenoiser, GarbageEverywhereGivesSoundImages) {
   const float bad[] = {kNan, kInfinity, -kInfinity, 0.0f, -0.0f, 1e-45f, 3e38f, -3e38f, 1.0f, 0.5f, 12.0f};
   const auto pick = [&](uint32_t i, uint32_t c, uint32_t f) {
