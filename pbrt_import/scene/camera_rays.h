@@ -61,6 +61,12 @@ public:
 
   Projection projection() const { return projection_; }
   const DAffine& world_from_camera() const { return world_from_camera_; }
+  const DAffine& camera_from_world() const { return camera_from_world_; }
+  /// World units per camera unit along camera z.
+  double depth_scale() const { return depth_scale_; }
+  /// Edges x0, x1, y0, y1 of the film, in the units of film_x().
+  glm::dvec4 window() const { return window_; }
+  glm::dvec2 offset_px() const { return offset_px_; }
   /// Film coordinates of the (shifted) centres of a column or row of pixels; not for environment cameras. Rays of
   /// perspective cameras lead from the origin of camera space through (film_x, film_y, 1).
   double film_x(uint32_t x) const {
@@ -84,7 +90,7 @@ private:
   glm::dvec4 window_; ///< x0, x1, y0, y1 at z = 1; perspective: scaled by tan(fov / 2)
   DAffine world_from_camera_;
   DAffine camera_from_world_;
-  double depth_scale_; ///< world units per camera unit along camera z
+  double depth_scale_;
 };
 
 inline CameraRay PrimaryCamera::linear_ray(uint32_t x, uint32_t y) const {

@@ -107,7 +107,9 @@ uint64_t trace_view_occlusion(const ViewTracer& tracer, const UnitSpace& space, 
   progress.advance(gbuffer.size.pixels() - count);
   const OcclusionSamples samples = samples_of(config, plan, radius, space);
   if (ao.may_stay_on_gpu) {
-    const OcclusionPoints points{count, [&](size_t first, std::span<OcclusionPoint> out) { tiles.write(first, out); }};
+    OcclusionPoints points{count, [&](size_t first, std::span<OcclusionPoint> out) { tiles.write(first, out); }};
+    if (gbuffer.on_gpu)
+      points.surfaces = PictureSurfaces{gbuffer.on_gpu.get(), gbuffer.size, plan.colour, config.offset_scale};
     ao.on_gpu = tracer.leave_occlusion(points, samples, {gbuffer.size.pixels(), double{radius}}, std::move(ao.on_gpu),
                                        progress);
     return count * uint64_t{plan.count};

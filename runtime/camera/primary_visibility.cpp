@@ -5,6 +5,7 @@
 #include <tuple>
 #include <vector>
 
+#include "runtime/camera/device_surfaces.h"
 #include "runtime/camera/ray_columns.h"
 #include "runtime/camera/surface_motion.h"
 #include "runtime/camera/tiles.h"
@@ -46,13 +47,17 @@ public:
 
   bool sees_motion() const { return motion_.any(); }
 
-  /// Traces all rays of the picture at once; trace_tile() then uses these hits.
-  void trace_view(const ViewTracer& tracer, const Progress& progress) {
+  /// Traces all rays of the picture at once; trace_tile() then uses these hits. Returns true if the tracer has filled
+  /// the G-buffer, so that no tile is left.
+  bool trace_view(const ViewTracer& tracer, const PreviousFrame& previous, const Progress& progress) {
     out_.on_gpu = tracer.trace_camera(now_, kCameraRays, std::move(out_.on_gpu), progress);
-    if (out_.on_gpu)
-      pixel_hits_ = tracer.hits(*out_.on_gpu);
-    else
+    if (!out_.on_gpu) {
       trace_spans(tracer, progress);
+      return false;
+    }
+    if (make_device_surfaces(tracer, now_, previous, out_)) return true;
+    pixel_hits_ = tracer.hits(*out_.on_gpu);
+    return false;
   }
 
   /// Sets the pixel of the image that the first pixel of the G-buffer stands for.
@@ -285,10 +290,11 @@ void trace_primary(const SceneSource& source, const RayTracer& tracer, const Pri
   PrimaryTracer primary(source, tracer, now, previous, textures, gbuffer);
   gbuffer.previous_z.resize(primary.sees_motion() ? now.size().pixels() : 0);
   progress.begin("primary rays", now.size().pixels());
-  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer))
-    primary.trace_view(*view, progress);
-  else
+  if (const auto* view = dynamic_cast<const ViewTracer*>(&tracer)) {
+    if (primary.trace_view(*view, previous, progress)) return progress.advance(now.size().pixels());
+  } else {
     gbuffer.on_gpu = nullptr;
+  }
   for_each_tile(now.size(), progress, [&](const Tile& tile) { primary.trace_tile(tile); });
 }
 

@@ -9,6 +9,7 @@
 #include "runtime/gpu/device/kernel.h"
 #include "runtime/gpu/device/staged_buffer.h"
 #include "runtime/gpu/device_ao.h"
+#include "runtime/gpu/device_view.h"
 #include "runtime/gpu/shaders/spirv.h"
 
 namespace packtrace::gpu {
@@ -178,11 +179,25 @@ std::vector<DenoiserDispatch> DeviceDenoiser::State::run() {
 
 /// Uploads what the history's kernel reads.
 void DeviceDenoiser::State::upload(const DenoiseRecord& terms, const DenoiserFrame& frame) {
-  if ((terms.flags & kKeepGuides) == 0)
-    view_z.write(commands, std::as_bytes(frame.view_z)), normal.write(commands, std::as_bytes(frame.normal)),
-        instance.write(commands, std::as_bytes(frame.instance));
-  if ((terms.flags & kFollowMotion) != 0)
-    motion.write(commands, std::as_bytes(frame.motion_px)), previous_z.write(commands, std::as_bytes(frame.previous_z));
+  const DeviceView* here = frame.view_on_device;
+  if (here != nullptr && (!here->has_surfaces() || here->device() != device)) here = nullptr;
+  /// @param plane of a picture on the device
+  const auto take = [&](StagedBuffer& buffer, const auto& channel, uint32_t plane) {
+    if (here != nullptr)
+      commands.copy(here->planes().device(), buffer.device(), plane * sizeof(float) * pixels(), 0,
+                    channel.size_bytes());
+    else
+      buffer.write(commands, std::as_bytes(channel));
+  };
+  if ((terms.flags & kKeepGuides) == 0) {
+    take(view_z, frame.view_z, kViewZPlane);
+    take(normal, frame.normal, kNormalPlane);
+    take(instance, frame.instance, kInstancePlane);
+  }
+  if ((terms.flags & kFollowMotion) != 0) {
+    take(motion, frame.motion_px, kMotionPlane);
+    take(previous_z, frame.previous_z, kPreviousZPlane);
+  }
   limits.write(commands, std::as_bytes(frame.max_history));
   if (frame.ao_on_device == nullptr) {
     ao.write(commands, std::as_bytes(frame.ao));

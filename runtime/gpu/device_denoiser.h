@@ -12,6 +12,7 @@
 namespace packtrace::gpu {
 
 class DeviceAo;
+class DeviceView;
 
 /// The channels of a frame that the denoiser reads, one entry per pixel, rows top to bottom: GBuffer and AoFrame.
 struct DenoiserFrame {
@@ -22,7 +23,8 @@ struct DenoiserFrame {
   std::span<const float> previous_z;  ///< may be empty
   std::span<const float> max_history; ///< may be empty
   std::span<const float> ao;
-  const DeviceAo* ao_on_device = nullptr; ///< in place of `ao`
+  const DeviceAo* ao_on_device = nullptr;     ///< in place of `ao`
+  const DeviceView* view_on_device = nullptr; ///< has the values of all channels above but max_history, if it is set
 };
 
 /// Where the result goes, one entry per pixel. What is empty is not read back.

@@ -39,17 +39,31 @@ public:
   /// Makes a point of each pixel that was hit, lifted off its surface by a length of unit space.
   void make_points(float lift);
 
-  /// Traces the rays of all pixels of a camera and reads their hits back.
+  /// Traces the rays of all pixels of a camera.
   /// @param film PrimaryCamera::film_x() of all columns, then film_y() of all rows
   /// @param reused a picture whose memory may be used, or null
   std::shared_ptr<DeviceView> trace_view(const ViewRecord& view, std::span<const double> film, uint32_t ray_class,
                                          std::shared_ptr<DeviceView> reused, const Watch& watch);
+  /// Reads the hits of a picture back.
+  void read_hits(const DeviceView& picture) const;
+
+  /// Uploads what surfaces need of the scene's instances and clusters.
+  /// @param lookup instance of each placement, then the words of a NormalRecord for each cluster
+  void set_surfaces(std::span<const InstanceSurface> instances, std::span<const uint32_t> lookup);
+  /// Makes the planes of the last picture that trace_view() traced, and reads them back. Needs set_surfaces().
+  /// Throws as Buffer does.
+  void make_surfaces(DeviceView& picture, const SurfaceViewRecord& view);
+  /// Device memory of set_surfaces().
+  uint64_t surface_bytes() const;
 
   /// Uses other points, which lie on surfaces of the scene. Throws Error(kLimitExceeded) for more than 2^31.
   /// @param write writes all points; it must not read them
   void set_points(size_t count, const std::function<void(std::span<PointRecord>)>& write);
   /// Does the same with points that are there.
   void set_points(std::span<const PointRecord> points);
+  /// Makes a point of each pixel that shows a surface.
+  /// @param points.first, points.count are ignored
+  void set_points(const DeviceView& picture, PicturePointsRecord points);
 
   /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
   /// Throws Error(kUnsupported) if a kernel's loop ended early.

@@ -9,7 +9,7 @@
 
 namespace packtrace::gpu {
 
-/// What the camera rays of a picture hit, on a device and mapped.
+/// What the camera rays of a picture hit, on a device and mapped: hits, and planes of a G-buffer made of them.
 class DeviceView {
 public:
   /// Throws as Buffer does.
@@ -19,13 +19,28 @@ public:
   const std::shared_ptr<Device>& device() const { return device_; }
   size_t pixels() const { return pixels_; }
   const StagedBuffer& hits_buffer() const { return hits_; }
+  /// kPlaneWords words per pixel, plane by plane. Allocated at the first call, which throws as Buffer does.
+  const StagedBuffer& planes() {
+    if (planes_.bytes() == 0) planes_ = StagedBuffer(device_, pixels_ * kPlaneWords * sizeof(uint32_t), "surfaces");
+    return planes_;
+  }
+  const StagedBuffer& planes() const { return planes_; }
+  /// Whether the planes are those of the hits.
+  bool has_surfaces() const { return has_surfaces_; }
+  void set_surfaces(bool made) { has_surfaces_ = made; }
+  /// A plane that was read back.
+  template <typename Value>
+  std::span<const Value> plane(uint32_t number) const {
+    return {reinterpret_cast<const Value*>(planes_.host().as<uint32_t>() + number * pixels_), pixels_};
+  }
   /// One per pixel, rows top to bottom.
   std::span<const packed::KernelHit> hits() const { return {hits_.host().as<packed::KernelHit>(), pixels_}; }
 
 private:
   std::shared_ptr<Device> device_;
   size_t pixels_;
-  StagedBuffer hits_;
+  StagedBuffer hits_, planes_;
+  bool has_surfaces_ = false;
 };
 
 } // namespace packtrace::gpu

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "pbrt_import/base/progress.h"
@@ -26,11 +27,32 @@ struct OcclusionPoint {
   uint32_t x_px = 0, y_px = 0;
 };
 
+/// Surfaces of a picture on a device, of which the device can make the points itself.
+struct PictureSurfaces {
+  const gpu::DeviceView* picture;
+  ImageSize size;
+  std::optional<uint32_t> colour; ///< SamplePlan::colour
+  float offset_scale;             ///< AoConfig::offset_scale
+};
+
 /// Points that are written where a tracer wants them.
 struct OcclusionPoints {
   size_t count = 0;
   /// Writes points [first, first + out.size()). It may use all cores.
   std::function<void(size_t first, std::span<OcclusionPoint> out)> write;
+  std::optional<PictureSurfaces> surfaces = std::nullopt; ///< with the same points
+};
+
+/// Arrays of a GBuffer that a tracer made, one entry per pixel, rows top to bottom. Valid until the picture's memory is
+/// used again.
+struct SurfacePlanes {
+  std::span<const float> view_z;
+  std::span<const Vec3> normal;
+  std::span<const uint32_t> instance;
+  std::span<const Vec2> motion_px;
+  std::span<const float> previous_z;
+  std::span<const Vec3> position, geometric_normal;
+  std::span<const float> offset;
 };
 
 /// The samples of all points: of SamplerKind::kSpaceTimeNet, directed as ShadingPoints::write_rays() does.
@@ -73,6 +95,12 @@ public:
                                                         const Progress& progress) const = 0;
   /// The hits of such a picture, one per pixel. Valid until its memory is used again.
   virtual std::span<const RayHit> hits(const gpu::DeviceView& picture) const = 0;
+  /// Makes the surfaces that the rays of the last such picture hit: the bits of trace_primary(). Returns nothing if
+  /// there is no memory for them, or the scene's scale is so extreme that the device may round differently.
+  /// @param previous not an environment camera; motion is that of surfaces at rest since this camera
+  /// @param no_motion_px kNoMotionPx
+  virtual std::optional<SurfacePlanes> make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
+                                                     const PrimaryCamera& previous, double no_motion_px) const = 0;
 
   /// Makes the occlusion rays of all points and sums up what they meet: the bits that trace_ao() computes from spans of
   /// rays.

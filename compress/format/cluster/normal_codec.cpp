@@ -7,8 +7,6 @@
 namespace packtrace {
 namespace {
 
-constexpr int32_t kZsignXLast = 32766, kZsignYLast = 65534; // codes of +1; larger codes are never written
-
 int32_t last_x(const NormalFormat& format) { return static_cast<int32_t>(format.x_codes) - 1; }
 int32_t last_y(const NormalFormat& format) { return static_cast<int32_t>(format.y_codes) - 1; }
 

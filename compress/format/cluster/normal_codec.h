@@ -47,6 +47,9 @@ constexpr const NormalFormat& format_of(NormalEncoding encoding) {
   return kNormalFormats[static_cast<size_t>(encoding)];
 }
 
+/// Codes of +1 in zsign encodings; larger codes are never written.
+inline constexpr int32_t kZsignXLast = 32766, kZsignYLast = 65534;
+
 /// Coefficients of the axis encodings' cubic t (slope + cubic t^2). The slope at 0 is a multiple of 2^-10 close to the
 /// one with the least maximum error. The cubic coefficient makes the value sqrt(1/2) at t = 1.
 inline constexpr double kAxisSlope = 803.0 / 1024.0;

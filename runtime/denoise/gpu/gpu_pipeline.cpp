@@ -103,7 +103,8 @@ void GpuPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySo
                                   gbuffer.previous_z,
                                   ao.max_history,
                                   ao.ao,
-                                  ao.on_gpu.get()});
+                                  ao.on_gpu.get(),
+                                  gbuffer.on_gpu.get()});
   has_frame_ = true;
 }
 

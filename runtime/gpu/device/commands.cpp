@@ -16,10 +16,11 @@ void Commands::dispatch(const Kernel& kernel, std::span<const std::byte> push, u
   steps_.push_back(step);
 }
 
-void Commands::copy(const Buffer& from, const Buffer& to, uint64_t offset, uint64_t bytes) {
+void Commands::copy(const Buffer& from, const Buffer& to, uint64_t from_offset, uint64_t to_offset, uint64_t bytes) {
   if (bytes == 0) return;
   Step step;
-  step.kind = Kind::kCopy, step.from = from.handle(), step.to = to.handle(), step.offset = offset, step.bytes = bytes;
+  step.kind = Kind::kCopy, step.from = from.handle(), step.to = to.handle();
+  step.from_offset = from_offset, step.offset = to_offset, step.bytes = bytes;
   steps_.push_back(step);
 }
 

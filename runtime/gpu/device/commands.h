@@ -22,7 +22,10 @@ public:
   void dispatch(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups_x, uint32_t groups_y);
   void copy(const Buffer& from, const Buffer& to, uint64_t bytes) { copy(from, to, 0, bytes); }
   /// @param offset of the bytes in both buffers
-  void copy(const Buffer& from, const Buffer& to, uint64_t offset, uint64_t bytes);
+  void copy(const Buffer& from, const Buffer& to, uint64_t offset, uint64_t bytes) {
+    copy(from, to, offset, offset, bytes);
+  }
+  void copy(const Buffer& from, const Buffer& to, uint64_t from_offset, uint64_t to_offset, uint64_t bytes);
   /// Sets words of a buffer.
   void fill(const Buffer& buffer, uint64_t first_word, uint64_t words, uint32_t value);
 
@@ -39,7 +42,7 @@ private:
     std::array<std::byte, kMostPushBytes> push{};
     uint32_t push_bytes = 0, groups_x = 0, groups_y = 0;
     VkBuffer from = VK_NULL_HANDLE, to = VK_NULL_HANDLE;
-    uint64_t offset = 0, bytes = 0;
+    uint64_t from_offset = 0, offset = 0, bytes = 0; ///< offset: in `to`
     uint32_t value = 0;
   };
   std::vector<Step> steps_;

@@ -96,7 +96,7 @@ void Device::record(const Commands& commands) {
     if (step.kind == Commands::Kind::kFill) {
       vkCmdFillBuffer(commands_, step.to, step.offset, step.bytes, step.value);
     } else if (step.kind == Commands::Kind::kCopy) {
-      const VkBufferCopy region{step.offset, step.offset, step.bytes};
+      const VkBufferCopy region{step.from_offset, step.offset, step.bytes};
       vkCmdCopyBuffer(commands_, step.from, step.to, 1, &region);
     } else {
       write_stamp(VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT); // once the work before has ended

@@ -8,6 +8,7 @@
 #include <limits>
 #include <string>
 
+#include "compress/format/cluster/normal_codec.h"
 #include "runtime/denoise/kernels/filter_rows.h"
 #include "runtime/denoise/kernels/history_rows.h"
 #include "runtime/denoise/kernels/trend.h"
@@ -61,6 +62,40 @@ void write_constants(std::ostream& out) {
   write(out, "kRandomOrder", kRandomOrder);
 }
 
+void write_surface_constants(std::ostream& out) {
+  write(out, "kNoInstance", kNoInstance);
+  write(out, "kHasNormals", kHasNormals);
+  write(out, "kViewZPlane", kViewZPlane);
+  write(out, "kNormalPlane", kNormalPlane);
+  write(out, "kInstancePlane", kInstancePlane);
+  write(out, "kMotionPlane", kMotionPlane);
+  write(out, "kPreviousZPlane", kPreviousZPlane);
+  write(out, "kPositionPlane", kPositionPlane);
+  write(out, "kGeometricPlane", kGeometricPlane);
+  write(out, "kOffsetPlane", kOffsetPlane);
+}
+
+/// @param value of a NormalFormat
+template <typename Value>
+void write_formats(std::ostream& out, const char* name, const Value& value) {
+  out << "const uint " << name << '[' << kNormalFormats.size() << "] = uint[](";
+  for (size_t i = 0; i < kNormalFormats.size(); ++i) out << (i > 0 ? ", " : "") << value(kNormalFormats[i]) << 'u';
+  out << ");\n";
+}
+
+void write_normal_constants(std::ostream& out) {
+  write(out, "kZsignNormals", static_cast<uint32_t>(NormalFamily::kZsign));
+  write(out, "kAxisNormals", static_cast<uint32_t>(NormalFamily::kAxis));
+  write_formats(out, "kNormalFamily", [](const NormalFormat& f) { return static_cast<uint32_t>(f.family); });
+  write_formats(out, "kNormalCharts", [](const NormalFormat& f) { return f.charts; });
+  write_formats(out, "kNormalXCodes", [](const NormalFormat& f) { return f.x_codes; });
+  write_formats(out, "kNormalYCodes", [](const NormalFormat& f) { return f.y_codes; });
+  write(out, "kZsignXStep", 2.0f / static_cast<float>(kZsignXLast));
+  write(out, "kZsignYStep", 2.0f / static_cast<float>(kZsignYLast));
+  write(out, "kAxisSlope", static_cast<float>(kAxisSlope));
+  write(out, "kAxisCubic", static_cast<float>(kAxisCubic));
+}
+
 void write_denoiser_constants(std::ostream& out) {
   write(out, "kHasHistory", kHasHistory);
   write(out, "kFollowMotion", kFollowMotion);
@@ -112,6 +147,8 @@ int main(int argc, char** argv) {
   std::ofstream out(argv[1]);
   out << "// Written by gpu_record_generator from record_table.h.\n";
   write_constants(out);
+  write_surface_constants(out);
+  write_normal_constants(out);
   write_denoiser_constants(out);
   for (const GlslRecord& record : kRecords) write_record(out, record);
   out.close();

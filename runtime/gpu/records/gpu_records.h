@@ -90,6 +90,47 @@ struct ViewRecord {
   uint32_t reserved;
 };
 
+/// How an instance's surfaces lie in space: Placement.
+struct InstanceSurface {
+  double unit_from_surface[12]; ///< by column
+  float world_from_object[9];   ///< its linear part, by column
+  float reserved;
+};
+inline constexpr uint32_t kNoInstance = ~0u; ///< in place of an instance's number
+
+/// Where the normals of a cluster lie, and how they are packed: NormalPacking, and a palette.
+struct NormalRecord {
+  uint32_t place;    ///< first bit | encoding << 20 | chart << 24 | kHasNormals
+  uint32_t widths;   ///< of x | y << 5 | chart << 10 | palette index << 13 | number of palette entries << 17
+  uint32_t anchors;  ///< of x | y << 16
+  uint32_t instance; ///< in the tree of the world, else kNoInstance
+};
+inline constexpr uint32_t kHasNormals = 1u << 31;
+
+/// What surfaces need of a picture's cameras besides the ViewRecord.
+struct SurfaceViewRecord {
+  double inverse_scale;                    ///< of the unit space
+  double depth[4], depth_scale;            ///< third row of camera_from_world, and world units per camera unit
+  double before[12], before_depth_scale;   ///< camera_from_world of the previous camera, by column
+  double window[4], size[2], offset_px[2]; ///< of the previous camera: left, top, width, height on its film; pixels
+  double no_motion_px;                     ///< kNoMotionPx
+  uint32_t moved;                          ///< 1: the camera moved
+  uint32_t before_orthographic;            ///< 1, or 0: perspective
+};
+
+/// Planes of a G-buffer by the number of words per pixel before them; named as GBuffer's arrays.
+inline constexpr uint32_t kViewZPlane = 0, kNormalPlane = 1, kInstancePlane = 4, kMotionPlane = 5, kPreviousZPlane = 7,
+                          kPositionPlane = 8, kGeometricPlane = 11, kOffsetPlane = 14, kPlaneWords = 15;
+
+/// Points that are made of a picture's planes.
+struct PicturePointsRecord {
+  double centre[3], scale; ///< of the unit space
+  uint32_t first, count;   ///< threads
+  uint32_t width, height;
+  uint32_t colour; ///< SamplePlan::colour, or 2: all pixels
+  float offset_scale;
+};
+
 /// A surface point from which occlusion rays start, in unit space.
 struct PointRecord {
   float origin[3]; ///< lifted off the surface

@@ -127,6 +127,44 @@ inline constexpr std::array kViewFields = {
     GlslField{"uint", "reserved", offsetof(ViewRecord, reserved)},
 };
 
+inline constexpr std::array kInstanceSurfaceFields = {
+    GlslField{"double", "unit_from_surface", offsetof(InstanceSurface, unit_from_surface), 12},
+    GlslField{"float", "world_from_object", offsetof(InstanceSurface, world_from_object), 9},
+    GlslField{"float", "reserved", offsetof(InstanceSurface, reserved)},
+};
+
+inline constexpr std::array kNormalFields = {
+    GlslField{"uint", "place", offsetof(NormalRecord, place)},
+    GlslField{"uint", "widths", offsetof(NormalRecord, widths)},
+    GlslField{"uint", "anchors", offsetof(NormalRecord, anchors)},
+    GlslField{"uint", "instance", offsetof(NormalRecord, instance)},
+};
+
+inline constexpr std::array kSurfaceViewFields = {
+    GlslField{"double", "inverse_scale", offsetof(SurfaceViewRecord, inverse_scale)},
+    GlslField{"double", "depth", offsetof(SurfaceViewRecord, depth), 4},
+    GlslField{"double", "depth_scale", offsetof(SurfaceViewRecord, depth_scale)},
+    GlslField{"double", "before", offsetof(SurfaceViewRecord, before), 12},
+    GlslField{"double", "before_depth_scale", offsetof(SurfaceViewRecord, before_depth_scale)},
+    GlslField{"double", "window", offsetof(SurfaceViewRecord, window), 4},
+    GlslField{"double", "size", offsetof(SurfaceViewRecord, size), 2},
+    GlslField{"double", "offset_px", offsetof(SurfaceViewRecord, offset_px), 2},
+    GlslField{"double", "no_motion_px", offsetof(SurfaceViewRecord, no_motion_px)},
+    GlslField{"uint", "moved", offsetof(SurfaceViewRecord, moved)},
+    GlslField{"uint", "before_orthographic", offsetof(SurfaceViewRecord, before_orthographic)},
+};
+
+inline constexpr std::array kPicturePointsFields = {
+    GlslField{"double", "centre", offsetof(PicturePointsRecord, centre), 3},
+    GlslField{"double", "scale", offsetof(PicturePointsRecord, scale)},
+    GlslField{"uint", "first", offsetof(PicturePointsRecord, first)},
+    GlslField{"uint", "count", offsetof(PicturePointsRecord, count)},
+    GlslField{"uint", "width", offsetof(PicturePointsRecord, width)},
+    GlslField{"uint", "height", offsetof(PicturePointsRecord, height)},
+    GlslField{"uint", "colour", offsetof(PicturePointsRecord, colour)},
+    GlslField{"float", "offset_scale", offsetof(PicturePointsRecord, offset_scale)},
+};
+
 inline constexpr std::array kPointFields = {
     GlslField{"float", "origin", offsetof(PointRecord, origin), 3},
     GlslField{"float", "up", offsetof(PointRecord, up), 3},
@@ -211,6 +249,10 @@ inline constexpr std::array kRecords = {
     GlslRecord{"SpanRecord", sizeof(SpanRecord), kSpanFields},
     GlslRecord{"CameraRecord", sizeof(CameraRecord), kCameraFields},
     GlslRecord{"ViewRecord", sizeof(ViewRecord), kViewFields},
+    GlslRecord{"InstanceSurface", sizeof(InstanceSurface), kInstanceSurfaceFields},
+    GlslRecord{"NormalRecord", sizeof(NormalRecord), kNormalFields},
+    GlslRecord{"SurfaceViewRecord", sizeof(SurfaceViewRecord), kSurfaceViewFields},
+    GlslRecord{"PicturePointsRecord", sizeof(PicturePointsRecord), kPicturePointsFields},
     GlslRecord{"PointRecord", sizeof(PointRecord), kPointFields},
     GlslRecord{"OcclusionRecord", sizeof(OcclusionRecord), kOcclusionFields},
     GlslRecord{"OcclusionImageRecord", sizeof(OcclusionImageRecord), kOcclusionImageFields},

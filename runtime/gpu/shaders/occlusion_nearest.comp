@@ -44,6 +44,7 @@ void main() {
   if (i >= push.point_count) return;
   i += push.first_point;
   Point p = read_point(i);
+  if (p.pixel == kNoPoint) return;
   precise double seen = sums[2u * i], distance = sums[2u * i + 1u];
   for (uint s = 0u; s < push.sample_count; ++s) {
     UnitRay u = unit_ray(p.origin, sample_direction(p, push.first_sample + s), 0.0, push.tfar);

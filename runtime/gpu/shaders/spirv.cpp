@@ -24,6 +24,12 @@ constexpr uint32_t kView[] = {
 constexpr uint32_t kCopy[] = {
 #include <copy.inc>
 };
+constexpr uint32_t kSurfaces[] = {
+#include <surfaces.inc>
+};
+constexpr uint32_t kPicturePoints[] = {
+#include <picture_points.inc>
+};
 constexpr uint32_t kSurfacePoints[] = {
 #include <surface_points.inc>
 };
@@ -115,6 +121,8 @@ std::span<const uint32_t> prepare() { return kPrepare; }
 std::span<const uint32_t> camera() { return kCamera; }
 std::span<const uint32_t> view() { return kView; }
 std::span<const uint32_t> copy() { return kCopy; }
+std::span<const uint32_t> surfaces() { return kSurfaces; }
+std::span<const uint32_t> picture_points() { return kPicturePoints; }
 std::span<const uint32_t> surface_points() { return kSurfacePoints; }
 std::span<const uint32_t> occlusion_rays() { return kOcclusionRays; }
 std::span<const uint32_t> occlusion_image() { return kOcclusionImage; }

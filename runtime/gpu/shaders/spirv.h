@@ -13,6 +13,8 @@ std::span<const uint32_t> prepare();
 std::span<const uint32_t> camera();
 std::span<const uint32_t> view();
 std::span<const uint32_t> copy();
+std::span<const uint32_t> surfaces();
+std::span<const uint32_t> picture_points();
 std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();
 std::span<const uint32_t> occlusion_image();

@@ -10,6 +10,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/gpu/device_view.h"
+#include "runtime/trace/gpu/surface_tables.h"
 
 namespace packtrace {
 
@@ -53,13 +54,15 @@ gpu::ViewRecord view_record(const PrimaryCamera& camera, const UnitSpace& space)
 
 GpuTracer::GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers,
                      std::shared_ptr<StructureCache> cache)
-    : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_, config.structures) {
+    : file_(file), source_(source), packed_(file, source, chosen_isa(), movers),
+      tables_(file, source, packed_, config.structures) {
   upload(config, std::move(cache));
 }
 
 GpuTracer::GpuTracer(const BakedFile& file, const LodSource& source, const GpuConfig& config, const Movers& movers,
                      std::shared_ptr<StructureCache> cache)
-    : packed_(file, source, chosen_isa(), movers), tables_(file, source, packed_, config.structures) {
+    : file_(file), source_(source), packed_(file, source, chosen_isa(), movers),
+      tables_(file, source, packed_, config.structures) {
   upload(config, std::move(cache));
 }
 
@@ -139,8 +142,32 @@ std::shared_ptr<gpu::DeviceView> GpuTracer::trace_camera(const PrimaryCamera& ca
 }
 
 std::span<const RayHit> GpuTracer::hits(const gpu::DeviceView& picture) const {
+  const std::lock_guard lock(device_rays_mutex_);
+  device_rays_->read_hits(picture);
   const std::span<const packed::KernelHit> hits = picture.hits();
   return {reinterpret_cast<const RayHit*>(hits.data()), hits.size()};
+}
+
+std::optional<SurfacePlanes> GpuTracer::make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
+                                                      const PrimaryCamera& previous, double no_motion_px) const {
+  constexpr double kMaxScale = 0x1p80; // devices may flush denormal floats, which surfaces in smaller units have
+  if (!(space().scale() <= kMaxScale && space().scale() >= 1.0 / kMaxScale)) return std::nullopt;
+  const std::lock_guard lock(device_rays_mutex_);
+  try {
+    if (!std::exchange(surfaces_uploaded_, true)) {
+      const SurfaceTables tables = surface_tables(file_, source_, packed_);
+      device_rays_->set_surfaces(tables.instances, tables.lookup);
+    }
+    device_rays_->make_surfaces(picture, surface_view_record(now, previous, space(), no_motion_px));
+  } catch (const Error& error) {
+    surfaces_uploaded_ = false;
+    if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
+    return std::nullopt;
+  }
+  return SurfacePlanes{picture.plane<float>(gpu::kViewZPlane),       picture.plane<Vec3>(gpu::kNormalPlane),
+                       picture.plane<uint32_t>(gpu::kInstancePlane), picture.plane<Vec2>(gpu::kMotionPlane),
+                       picture.plane<float>(gpu::kPreviousZPlane),   picture.plane<Vec3>(gpu::kPositionPlane),
+                       picture.plane<Vec3>(gpu::kGeometricPlane),    picture.plane<float>(gpu::kOffsetPlane)};
 }
 
 /// Traces the rays of all points, of as many at once as there is memory for.
@@ -173,15 +200,48 @@ void GpuTracer::trace_parts(const OcclusionPoints& points, const OcclusionSample
 /// @param report of the share that is done
 void GpuTracer::trace_part(const OcclusionPoints& points, size_t first, size_t count, const OcclusionSamples& samples,
                            const std::function<void(double)>& report) const {
-  follow_structures();
-  const gpu::OcclusionRecord record = occlusion_record(samples, scene_->subgroup_size());
   device_rays_->set_points(count, [&](std::span<gpu::PointRecord> out) {
     points.write(first, {reinterpret_cast<OcclusionPoint*>(out.data()), out.size()});
   });
+  trace_points(samples, report);
+}
+
+/// Traces the rays of the points that device_rays_ has.
+void GpuTracer::trace_points(const OcclusionSamples& samples, const std::function<void(double)>& report) const {
+  follow_structures();
+  const gpu::OcclusionRecord record = occlusion_record(samples, scene_->subgroup_size());
   if (samples.nearest)
     device_rays_->sum_nearest(record, report);
   else
     device_rays_->count_occluded(record, report);
+}
+
+/// Traces the rays of points that the device makes of a picture's surfaces. Returns false if it cannot, or if there is
+/// no memory for all of them at once.
+bool GpuTracer::trace_picture(const OcclusionPoints& points, const OcclusionSamples& samples,
+                              Progress& progress) const {
+  if (!points.surfaces || !points.surfaces->picture->has_surfaces()) return false;
+  const PictureSurfaces& surfaces = *points.surfaces;
+  gpu::PicturePointsRecord record{};
+  for (int axis = 0; axis < 3; ++axis) record.centre[axis] = space().centre()[axis];
+  record.scale = space().scale();
+  record.width = surfaces.size.width, record.height = surfaces.size.height;
+  record.colour = surfaces.colour.value_or(2u), record.offset_scale = surfaces.offset_scale;
+  uint64_t reported = 0;
+  const auto report = [&](double share) {
+    const auto done = std::max(reported, static_cast<uint64_t>(share * static_cast<double>(points.count)));
+    progress.advance(done - std::exchange(reported, done));
+  };
+  try {
+    device_rays_->set_points(*surfaces.picture, record);
+    trace_points(samples, report);
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::kLimitExceeded || reported > 0) throw;
+    device_rays_->release();
+    return false;
+  }
+  report(1.0);
+  return true;
 }
 
 void GpuTracer::trace_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples,
@@ -214,7 +274,10 @@ std::shared_ptr<gpu::DeviceAo> GpuTracer::leave_occlusion(const OcclusionPoints&
   const auto take = [&](size_t, size_t) {
     device_rays_->write_picture(*out, samples.count, samples.nearest, picture.radius);
   };
-  trace_parts(points, samples, take, progress);
+  if (trace_picture(points, samples, progress))
+    take(0, points.count);
+  else
+    trace_parts(points, samples, take, progress);
   return out;
 }
 
@@ -232,6 +295,7 @@ void GpuTracer::place_instances(std::span<const uint32_t> instances, std::span<c
   packed_.place_instances(instances, world_from_object);
   tables_.update_placements();
   scene_->replace_placements(tables_.view());
+  surfaces_uploaded_ = false;
   if (cache_) place_structures();
 }
 
@@ -253,7 +317,7 @@ std::vector<TreeBytes> GpuTracer::tree_bytes() const {
 
 std::vector<ResidentPart> GpuTracer::resident() const {
   std::vector<ResidentPart> parts = packed_.resident();
-  parts.push_back({"on the GPU", scene_->bytes(), false});
+  parts.push_back({"on the GPU", scene_->bytes() + device_rays_->surface_bytes(), false});
   if (cache_) parts.push_back({"acceleration structures", cache_->stats().resident_bytes, true});
   return parts;
 }

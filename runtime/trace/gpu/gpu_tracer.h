@@ -42,6 +42,8 @@ public:
                                                 std::shared_ptr<gpu::DeviceView> reused,
                                                 const Progress& progress) const override;
   std::span<const RayHit> hits(const gpu::DeviceView& picture) const override;
+  std::optional<SurfacePlanes> make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
+                                             const PrimaryCamera& previous, double no_motion_px) const override;
   void trace_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples, std::span<OcclusionSums> sums,
                        Progress& progress) const override;
   std::shared_ptr<gpu::DeviceAo> leave_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples,
@@ -73,7 +75,11 @@ private:
                    Progress& progress) const;
   void trace_part(const OcclusionPoints& points, size_t first, size_t count, const OcclusionSamples& samples,
                   const std::function<void(double)>& report) const;
+  bool trace_picture(const OcclusionPoints& points, const OcclusionSamples& samples, Progress& progress) const;
+  void trace_points(const OcclusionSamples& samples, const std::function<void(double)>& report) const;
 
+  const BakedFile& file_;
+  const SceneSource& source_;
   PackedTracer packed_;
   GpuTables tables_;
   std::unique_ptr<gpu::GpuScene> scene_;
@@ -81,6 +87,7 @@ private:
   TakenStructures structures_;                 ///< of the cache
   mutable uint64_t structures_generation_ = 0; ///< of the cache, when the structures were placed
   std::unique_ptr<gpu::DeviceRays> device_rays_;
+  mutable bool surfaces_uploaded_ = false; ///< the tables of device_rays_->make_surfaces(), as instances are placed
   mutable std::mutex device_rays_mutex_;
   std::string device_; ///< its name, and how it makes floats
 };

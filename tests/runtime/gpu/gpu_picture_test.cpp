@@ -5,6 +5,7 @@
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/ao/view_occlusion.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/gpu/device_view.h"
 #include "runtime/trace/gpu/gpu_tracer.h"
 #include "tests/runtime/gpu/gpu_test_device.h"
 #include "tests/runtime/trace/packed_scenes.h"
@@ -44,8 +45,27 @@ protected:
     EXPECT_EQ(gbuffer.motion_px, expected.motion_px);
     EXPECT_EQ(gbuffer.previous_z, expected.previous_z);
     EXPECT_GT(std::ranges::count_if(expected.view_z, [](float z) { return z > 0.0f; }), 100);
+    expect_same_device_surfaces(tracer, now, before, expected);
     for (const std::string& message : tracer.scene().validation_messages()) ADD_FAILURE() << message;
     return gbuffer;
+  }
+
+  /// Compares the surfaces that the device makes, which have no other channels.
+  void expect_same_device_surfaces(const GpuTracer& tracer, const PrimaryCamera& now, const PrimaryCamera& before,
+                                   const GBuffer& expected) const {
+    GBuffer gbuffer;
+    gbuffer.keep_channels(0);
+    Progress progress;
+    trace_primary(baked_.source, tracer, now, before, gbuffer, progress);
+    EXPECT_EQ(gbuffer.view_z, expected.view_z);
+    EXPECT_EQ(gbuffer.position, expected.position);
+    EXPECT_EQ(gbuffer.geometric_normal, expected.geometric_normal);
+    EXPECT_EQ(gbuffer.normal, expected.normal);
+    EXPECT_EQ(gbuffer.instance, expected.instance);
+    EXPECT_EQ(gbuffer.offset, expected.offset);
+    EXPECT_EQ(gbuffer.motion_px, expected.motion_px);
+    EXPECT_EQ(gbuffer.previous_z, expected.previous_z);
+    EXPECT_EQ(gbuffer.on_gpu && gbuffer.on_gpu->has_surfaces(), now.projection() != Projection::kEnvironment);
   }
 
   /// Compares ambient occlusion of both tracers.

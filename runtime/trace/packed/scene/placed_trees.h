@@ -35,7 +35,9 @@ public:
   void fill_in(packed::KernelScene& scene) const;
 
   const UnitSpace& space() const { return space_; }
-  /// @param instance is placed: not flat, with triangles
+  /// Whether an instance can be hit: it has triangles and is not flat.
+  bool is_placed(uint32_t instance) const { return slot_of_[instance] != baked::kNone && flat_[instance] == 0; }
+  /// @param instance is placed
   const Placement& surface(uint32_t instance) const { return surfaces_[slot_of_[instance]]; }
   /// The instance of a placement; baked::kNone for the world tree.
   uint32_t instance_of(uint32_t placement) const { return instance_of_[placement]; }

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "runtime/camera/primary_visibility.h"
+#include "runtime/trace/view_tracer.h"
+
+namespace packtrace {
+
+/// Fills the G-buffer with surfaces that the tracer makes of the hits of gbuffer.on_gpu: those of trace_primary(), bit
+/// for bit. Returns false where the tracer cannot make them: for channels of GBufferChannel, surfaces that moved,
+/// environment cameras, and if there is no memory for them.
+/// @param gbuffer its arrays have their sizes
+bool make_device_surfaces(const ViewTracer& tracer, const PrimaryCamera& now, const PreviousFrame& previous,
+                          GBuffer& gbuffer);
+
+} // namespace packtrace

@@ -1,0 +1,127 @@
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "runtime/gpu/device_ao.h"
+#include "runtime/gpu/device_rays_state.h"
+#include "runtime/gpu/device_view.h"
+#include "runtime/gpu/shaders/spirv.h"
+
+// The functions of DeviceRays for whole pictures.
+namespace packtrace::gpu {
+
+std::shared_ptr<DeviceView> DeviceRays::trace_view(const ViewRecord& view, std::span<const double> film,
+                                                   uint32_t ray_class, std::shared_ptr<DeviceView> reused,
+                                                   const Watch& watch) {
+  State& s = *state_;
+  s.follow_scene();
+  require_few_pixels(view.width, view.height);
+  const size_t pixels = size_t{view.width} * view.height;
+  if (!reused || reused.use_count() > 1 || reused->pixels() != pixels || reused->device() != s.device) {
+    reused.reset();
+    reused = std::make_shared<DeviceView>(s.device, pixels);
+  }
+  reused->set_surfaces(false);
+  if (s.view.bytes() == 0) s.view = StagedBuffer(s.device, sizeof view, "the camera");
+  if (s.film.bytes() < film.size_bytes()) s.film = StagedBuffer(s.device, film.size_bytes(), "the camera's film");
+  Commands commands;
+  s.view.write(commands, push_bytes(view));
+  s.film.write(commands, std::as_bytes(film));
+  s.device->run(commands);
+  if (!s.view_kernel)
+    s.view_kernel =
+        s.scene.make_ray_kernel({spirv::view(), spirv::view_rays()}, kFirstRayBinding + 3, sizeof(SpanRecord));
+  const StagedBuffer& hits = reused->hits_buffer();
+  const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &hits.device()};
+  s.run_pixels(*s.view_kernel, buffers, view.width, view.height, ray_class, false, watch);
+  s.view_size = {view.width, view.height};
+  return reused;
+}
+
+void DeviceRays::read_hits(const DeviceView& picture) const {
+  const StagedBuffer& hits = picture.hits_buffer();
+  state_->device->copy(hits.device(), hits.host(), 0, 0, picture.pixels() * sizeof(packed::KernelHit));
+}
+
+void DeviceRays::set_surfaces(std::span<const InstanceSurface> instances, std::span<const uint32_t> lookup) {
+  State& s = *state_;
+  s.instances = Buffer(), s.lookup = Buffer();
+  s.instances = upload(s.device, std::as_bytes(instances), "instances", 0);
+  s.lookup = upload(s.device, std::as_bytes(lookup), "places of normals", 0);
+}
+
+uint64_t DeviceRays::surface_bytes() const { return state_->instances.bytes() + state_->lookup.bytes(); }
+
+void DeviceRays::make_surfaces(DeviceView& picture, const SurfaceViewRecord& view) {
+  State& s = *state_;
+  s.follow_scene();
+  const StagedBuffer& planes = picture.planes();
+  if (s.surface_view.bytes() == 0) s.surface_view = StagedBuffer(s.device, sizeof view, "cameras of surfaces");
+  if (!s.surfaces_kernel)
+    s.surfaces_kernel = s.scene.make_kernel(spirv::surfaces(), kFirstRayBinding + 7, sizeof(SpanRecord));
+  const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &picture.hits_buffer().device(), &s.instances,
+                                   &s.lookup,        &planes.device(), &s.surface_view.device()};
+  for (uint32_t i = 0; i < std::size(buffers); ++i) s.surfaces_kernel->bind(kFirstRayBinding + i, *buffers[i]);
+  Commands commands;
+  s.surface_view.write(commands, push_bytes(view));
+  const uint64_t threads = block_threads(s.view_size.width, s.view_size.height);
+  for (uint64_t first = 0; first < threads; first += s.most_threads()) {
+    const uint64_t count = std::min(threads - first, s.most_threads());
+    const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), 0, 0};
+    commands.dispatch(*s.surfaces_kernel, push_bytes(span), groups_of(count), 1);
+  }
+  commands.copy(planes.device(), planes.host(), planes.bytes());
+  s.device->run(commands);
+  picture.set_surfaces(true);
+}
+
+void DeviceRays::set_points(const DeviceView& picture, PicturePointsRecord points) {
+  State& s = *state_;
+  const uint64_t threads = block_threads(points.width, points.height);
+  s.point_count = static_cast<uint32_t>(threads);
+  s.make_room_for_points();
+  if (!s.picture_points_kernel)
+    s.picture_points_kernel = std::make_unique<Kernel>(s.device, spirv::picture_points(), std::span<const uint32_t>(),
+                                                       2, static_cast<uint32_t>(sizeof(PicturePointsRecord)));
+  s.picture_points_kernel->bind(0, picture.planes().device());
+  s.picture_points_kernel->bind(1, s.points.device());
+  Commands commands;
+  for (uint64_t first = 0; first < threads; first += s.most_threads()) {
+    points.first = static_cast<uint32_t>(first);
+    points.count = static_cast<uint32_t>(std::min(threads - first, s.most_threads()));
+    commands.dispatch(*s.picture_points_kernel, push_bytes(points), groups_of(points.count), 1);
+  }
+  s.device->run(commands);
+}
+
+std::shared_ptr<DeviceAo> DeviceRays::empty_picture(size_t pixels, std::shared_ptr<DeviceAo> reused) const {
+  const std::shared_ptr<Device>& device = state_->device;
+  if (!reused || reused->pixels() != pixels || reused->device() != device)
+    reused = std::make_shared<DeviceAo>(device, pixels);
+  Commands commands;
+  commands.fill(reused->values(), 0, pixels, std::bit_cast<uint32_t>(-1.0f)); // kInvalidAo
+  commands.fill(reused->values(), pixels, pixels, 0);
+  device->run(commands);
+  return reused;
+}
+
+void DeviceRays::write_picture(DeviceAo& picture, uint32_t sample_count, bool nearest, double radius) {
+  State& s = *state_;
+  if (s.point_count == 0) return;
+  if (!s.picture_kernel)
+    s.picture_kernel = std::make_unique<Kernel>(s.device, spirv::occlusion_image(), std::span<const uint32_t>(), 4,
+                                                static_cast<uint32_t>(sizeof(OcclusionImageRecord)));
+  const Buffer &counts = nearest ? s.sums : s.counts, &sums = nearest ? s.sums : s.counts; // one of them is read
+  const Buffer* const buffers[] = {&s.points.device(), &counts, &sums, &picture.values()};
+  for (uint32_t i = 0; i < std::size(buffers); ++i) s.picture_kernel->bind(i, *buffers[i]);
+  const OcclusionImageRecord record{
+      1.0 / sample_count, radius, s.point_count, sample_count, static_cast<uint32_t>(picture.pixels()),
+      nearest ? 1u : 0u};
+  s.device->run(*s.picture_kernel, push_bytes(record), groups_of(s.point_count));
+}
+
+void DeviceRays::read_picture(const DeviceAo& picture, std::span<float> ao, std::span<float> hit_distance) const {
+  picture.read(ao, hit_distance);
+}
+
+} // namespace packtrace::gpu
