@@ -126,7 +126,7 @@ Json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const
   FrameConfig config;
   config.size = size;
   config.jitter = false;
-  config.plain_layers = 0;
+  config.plain_layers = 0, config.all_channels = false; // as a window that shows ambient occlusion
   FrameLoop loop(scene, config);
   scene.backend.backend = Backend::kPacked;
   FrameLoop packed(scene, config);
