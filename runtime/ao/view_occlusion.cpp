@@ -12,6 +12,7 @@
 #include "runtime/ao/hash.h"
 #include "runtime/ao/shading_points.h"
 #include "runtime/ao/visibility_curve.h"
+#include "runtime/camera/device_surfaces.h"
 #include "runtime/camera/tiles.h"
 
 namespace packtrace {
@@ -35,7 +36,12 @@ public:
   }
 
   /// Writes points [first, first + out.size()).
-  void write(size_t first, std::span<OcclusionPoint> out) {
+  /// @param tracer has the points if the G-buffer has not
+  void write(const ViewTracer& tracer, size_t first, std::span<OcclusionPoint> out) {
+    if (gbuffer_.points_on_gpu && surfaces_ == &gbuffer_) {
+      read_device_points(tracer, gbuffer_, read_);
+      surfaces_ = &read_;
+    }
     // Callers may hold locks, so the thread must not take up other work while it waits.
     tbb::this_task_arena::isolate([&] {
       for_each_tile(gbuffer_.size, quiet_, [&](const Tile& tile) {
@@ -65,10 +71,12 @@ private:
       const uint32_t x = tile.x0 + morton_even_bits(code), y = tile.y0 + morton_even_bits(code >> 1);
       if (x < tile.x1 && y < tile.y1 && has_point(x, y)) points.add(x, y, y * gbuffer_.size.width + x);
     }
-    points.load_surfaces(gbuffer_, space_, offset_scale_);
+    points.load_surfaces(*surfaces_, space_, offset_scale_);
   }
 
   const GBuffer& gbuffer_;
+  GBuffer read_; ///< points of a device
+  const GBuffer* surfaces_ = &gbuffer_;
   const SamplePlan& plan_;
   const UnitSpace& space_;
   const float offset_scale_;
@@ -107,7 +115,8 @@ uint64_t trace_view_occlusion(const ViewTracer& tracer, const UnitSpace& space, 
   progress.advance(gbuffer.size.pixels() - count);
   const OcclusionSamples samples = samples_of(config, plan, radius, space);
   if (ao.may_stay_on_gpu) {
-    OcclusionPoints points{count, [&](size_t first, std::span<OcclusionPoint> out) { tiles.write(first, out); }};
+    OcclusionPoints points{count,
+                           [&](size_t first, std::span<OcclusionPoint> out) { tiles.write(tracer, first, out); }};
     if (gbuffer.on_gpu)
       points.surfaces = PictureSurfaces{gbuffer.on_gpu.get(), gbuffer.size, plan.colour, config.offset_scale};
     ao.on_gpu = tracer.leave_occlusion(points, samples, {gbuffer.size.pixels(), double{radius}}, std::move(ao.on_gpu),
@@ -116,7 +125,7 @@ uint64_t trace_view_occlusion(const ViewTracer& tracer, const UnitSpace& space, 
   }
   ao.on_gpu = nullptr;
   std::vector<OcclusionPoint> points(count);
-  tiles.write(0, points);
+  tiles.write(tracer, 0, points);
   std::vector<OcclusionSums> sums(count);
   const auto copy = [&](size_t first, std::span<OcclusionPoint> out) {
     std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(first), out.size(), out.begin());

@@ -7,6 +7,25 @@
 #include <tbb/parallel_for.h>
 
 namespace packtrace {
+namespace {
+
+/// Copies a plane into an array of its length, on all cores.
+template <typename Value>
+void copy_plane(std::span<const Value> plane, auto& array) {
+  constexpr size_t kValues = 1u << 15; // of a task
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, plane.size(), kValues), [&](const tbb::blocked_range<size_t>& part) {
+    std::memcpy(&array[part.begin()], &plane[part.begin()], part.size() * sizeof(Value));
+  });
+}
+
+void copy_points(const PointPlanes& planes, GBuffer& out) {
+  const size_t pixels = planes.offset.size();
+  out.position.resize(pixels), out.geometric_normal.resize(pixels), out.offset.resize(pixels);
+  copy_plane(planes.position, out.position), copy_plane(planes.geometric_normal, out.geometric_normal);
+  copy_plane(planes.offset, out.offset);
+}
+
+} // namespace
 
 bool make_device_surfaces(const ViewTracer& tracer, const PrimaryCamera& now, const PreviousFrame& previous,
                           GBuffer& gbuffer) {
@@ -16,19 +35,24 @@ bool make_device_surfaces(const ViewTracer& tracer, const PrimaryCamera& now, co
   const std::optional<SurfacePlanes> planes =
       tracer.make_surfaces(*gbuffer.on_gpu, now, previous.camera, double{kNoMotionPx});
   if (!planes) return false;
-  constexpr size_t kPixels = 1u << 14; // of a task
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, gbuffer.size.pixels(), kPixels),
-                    [&](const tbb::blocked_range<size_t>& pixels) {
-                      const auto copy = [&]<class Value>(std::span<const Value> from, auto& to) {
-                        std::memcpy(&to[pixels.begin()], &from[pixels.begin()], pixels.size() * sizeof(Value));
-                      };
-                      copy(planes->view_z, gbuffer.view_z), copy(planes->normal, gbuffer.normal);
-                      copy(planes->instance, gbuffer.instance), copy(planes->motion_px, gbuffer.motion_px);
-                      if (!gbuffer.previous_z.empty()) copy(planes->previous_z, gbuffer.previous_z);
-                      copy(planes->position, gbuffer.position), copy(planes->offset, gbuffer.offset);
-                      copy(planes->geometric_normal, gbuffer.geometric_normal);
-                    });
+  copy_plane(planes->view_z, gbuffer.view_z), copy_plane(planes->normal, gbuffer.normal);
+  copy_plane(planes->instance, gbuffer.instance);
+  if (planes->motion_px.empty())
+    gbuffer.motion_px.assign(gbuffer.size.pixels(), Vec2(0));
+  else
+    copy_plane(planes->motion_px, gbuffer.motion_px), copy_plane(planes->previous_z, gbuffer.previous_z);
+  gbuffer.points_on_gpu = gbuffer.points_may_stay_on_gpu;
+  if (gbuffer.points_on_gpu)
+    gbuffer.forget_points();
+  else
+    copy_points(tracer.read_points(*gbuffer.on_gpu), gbuffer);
   return true;
+}
+
+void read_device_points(const ViewTracer& tracer, const GBuffer& gbuffer, GBuffer& out) {
+  out.size = gbuffer.size;
+  out.normal = gbuffer.normal;
+  copy_points(tracer.read_points(*gbuffer.on_gpu), out);
 }
 
 } // namespace packtrace

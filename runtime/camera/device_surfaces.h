@@ -12,4 +12,8 @@ namespace packtrace {
 bool make_device_surfaces(const ViewTracer& tracer, const PrimaryCamera& now, const PreviousFrame& previous,
                           GBuffer& gbuffer);
 
+/// Reads points that stayed on a GPU (GBuffer::points_on_gpu) into the arrays of another G-buffer, with the shading
+/// normals.
+void read_device_points(const ViewTracer& tracer, const GBuffer& gbuffer, GBuffer& out);
+
 } // namespace packtrace

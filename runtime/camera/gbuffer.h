@@ -56,6 +56,10 @@ struct GBuffer {
   /// World-space length of a pixel at view z 1 (PrimaryCamera::pixel_spread()); 0 if unknown.
   float pixel_spread = 0.0f;
   std::shared_ptr<gpu::DeviceView> on_gpu; ///< memory for a GPU's hits, kept from frame to frame; else null
+  /// A tracer that works on a GPU may leave position, geometric_normal and offset there. Then `points_on_gpu` is true,
+  /// and these arrays are empty.
+  bool points_may_stay_on_gpu = false;
+  bool points_on_gpu = false;
 
   /// Makes all pixels misses.
   void resize(ImageSize new_size) {
@@ -77,11 +81,11 @@ struct GBuffer {
       if (!is_kept) array = Array(); // frees the memory, which `= {}` would keep
     });
   }
-  /// Frees position, geometric_normal and offset, from which rays start, until the next make_room().
+  /// Frees position, geometric_normal and offset, from which rays start.
   void forget_points() {
     position = PixelArray<Vec3>(), geometric_normal = PixelArray<Vec3>(), offset = PixelArray<float>();
   }
-  bool has_points() const { return position.size() == size.pixels(); }
+  bool has_points() const { return points_on_gpu || position.size() == size.pixels(); }
 
 private:
   /// Calls work(array, whether it is kept, value of a miss) for all arrays but previous_z.

@@ -178,7 +178,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   const Stopwatch tracing;
   const SamplePlan plan = sample_plan(shaded, limits);
   raw_.with_distances = needs_distances(config_, scene());
-  raw_.may_stay_on_gpu = config_.denoise && !quarter && scene().backend.backend == Backend::kGpu;
+  raw_.may_stay_on_gpu = leaves_samples_on_gpu();
   report_.ao_rays = trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, plan, raw_, progress);
   raw_.max_history = std::move(limits);
   if (config_.jitters()) raw_.samples = 1;

@@ -97,6 +97,7 @@ private:
   void trace_camera_rays(const PrimaryCamera& view, Progress& progress);
   void trace_still(const Camera& camera, uint32_t frames, bool plans);
   void require_surfaces(bool points);
+  bool leaves_samples_on_gpu() const;
   const GBuffer& shaded_surfaces() const;
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
   bool traces(uint32_t still_frame) const;

@@ -3,6 +3,7 @@
 #include <span>
 #include <string_view>
 
+#include "runtime/ao/view_occlusion.h"
 #include "runtime/camera/deformed_past.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
@@ -62,6 +63,8 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
                              moved_on ? state_.previous_transforms() : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};
   gbuffer_.keep_channels(channels_);
+  gbuffer_.points_may_stay_on_gpu = leaves_samples_on_gpu() && config_.ao_rate != AoRate::kAdaptive &&
+                                    traces_view_occlusion(config_.ao, {}) && state_.moved_boxes().empty();
   const TextureFilter textures{
       config_.shades() ? &shading_.prepare(*scene().source, scene().memory).textures() : nullptr, footprint_px()};
   trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen, textures);
@@ -100,6 +103,11 @@ void FrameLoop::trace_still(const Camera& camera, uint32_t frames, bool plans) {
     }
     if (still_frames_ == frames) break;
   }
+}
+
+/// Whether ambient occlusion stays on the GPU that traces it, for the denoiser there.
+bool FrameLoop::leaves_samples_on_gpu() const {
+  return config_.denoise && config_.ao_resolution == AoResolution::kFull && scene().backend.backend == Backend::kGpu;
 }
 
 /// The G-buffer from whose points occlusion rays start.

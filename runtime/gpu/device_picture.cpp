@@ -70,9 +70,16 @@ void DeviceRays::make_surfaces(DeviceView& picture, const SurfaceViewRecord& vie
     const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), 0, 0};
     commands.dispatch(*s.surfaces_kernel, push_bytes(span), groups_of(count), 1);
   }
-  commands.copy(planes.device(), planes.host(), planes.bytes());
+  const uint64_t words = view.moved != 0 ? kPositionPlane : kMotionPlane;
+  commands.copy(planes.device(), planes.host(), words * sizeof(uint32_t) * picture.pixels());
   s.device->run(commands);
   picture.set_surfaces(true);
+}
+
+void DeviceRays::read_points(const DeviceView& picture) const {
+  const uint64_t begin = uint64_t{kPositionPlane} * sizeof(uint32_t) * picture.pixels();
+  const StagedBuffer& planes = picture.planes();
+  state_->device->copy(planes.device(), planes.host(), begin, begin, planes.bytes() - begin);
 }
 
 void DeviceRays::set_points(const DeviceView& picture, PicturePointsRecord points) {

@@ -50,9 +50,11 @@ public:
   /// Uploads what surfaces need of the scene's instances and clusters.
   /// @param lookup instance of each placement, then the words of a NormalRecord for each cluster
   void set_surfaces(std::span<const InstanceSurface> instances, std::span<const uint32_t> lookup);
-  /// Makes the planes of the last picture that trace_view() traced, and reads them back. Needs set_surfaces().
-  /// Throws as Buffer does.
+  /// Makes the planes of the last picture that trace_view() traced, and reads those before the points' back. Without
+  /// view.moved, motion and previous depths are not read back either. Needs set_surfaces(). Throws as Buffer does.
   void make_surfaces(DeviceView& picture, const SurfaceViewRecord& view);
+  /// Reads the planes of the points back.
+  void read_points(const DeviceView& picture) const;
   /// Device memory of set_surfaces().
   uint64_t surface_bytes() const;
 

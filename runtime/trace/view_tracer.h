@@ -49,8 +49,10 @@ struct SurfacePlanes {
   std::span<const float> view_z;
   std::span<const Vec3> normal;
   std::span<const uint32_t> instance;
-  std::span<const Vec2> motion_px;
-  std::span<const float> previous_z;
+  std::span<const Vec2> motion_px;   ///< empty: zero everywhere
+  std::span<const float> previous_z; ///< empty: as view_z
+};
+struct PointPlanes {
   std::span<const Vec3> position, geometric_normal;
   std::span<const float> offset;
 };
@@ -101,6 +103,8 @@ public:
   /// @param no_motion_px kNoMotionPx
   virtual std::optional<SurfacePlanes> make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
                                                      const PrimaryCamera& previous, double no_motion_px) const = 0;
+  /// Reads the points of such surfaces.
+  virtual PointPlanes read_points(const gpu::DeviceView& picture) const = 0;
 
   /// Makes the occlusion rays of all points and sums up what they meet: the bits that trace_ao() computes from spans of
   /// rays.

@@ -152,22 +152,35 @@ std::optional<SurfacePlanes> GpuTracer::make_surfaces(gpu::DeviceView& picture, 
                                                       const PrimaryCamera& previous, double no_motion_px) const {
   constexpr double kMaxScale = 0x1p80; // devices may flush denormal floats, which surfaces in smaller units have
   if (!(space().scale() <= kMaxScale && space().scale() >= 1.0 / kMaxScale)) return std::nullopt;
+  const gpu::SurfaceViewRecord record = surface_view_record(now, previous, space(), no_motion_px);
   const std::lock_guard lock(device_rays_mutex_);
   try {
     if (!std::exchange(surfaces_uploaded_, true)) {
       const SurfaceTables tables = surface_tables(file_, source_, packed_);
       device_rays_->set_surfaces(tables.instances, tables.lookup);
     }
-    device_rays_->make_surfaces(picture, surface_view_record(now, previous, space(), no_motion_px));
+    device_rays_->make_surfaces(picture, record);
   } catch (const Error& error) {
     surfaces_uploaded_ = false;
     if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
     return std::nullopt;
   }
-  return SurfacePlanes{picture.plane<float>(gpu::kViewZPlane),       picture.plane<Vec3>(gpu::kNormalPlane),
-                       picture.plane<uint32_t>(gpu::kInstancePlane), picture.plane<Vec2>(gpu::kMotionPlane),
-                       picture.plane<float>(gpu::kPreviousZPlane),   picture.plane<Vec3>(gpu::kPositionPlane),
-                       picture.plane<Vec3>(gpu::kGeometricPlane),    picture.plane<float>(gpu::kOffsetPlane)};
+  SurfacePlanes planes{picture.plane<float>(gpu::kViewZPlane),
+                       picture.plane<Vec3>(gpu::kNormalPlane),
+                       picture.plane<uint32_t>(gpu::kInstancePlane),
+                       {},
+                       {}};
+  if (record.moved != 0)
+    planes.motion_px = picture.plane<Vec2>(gpu::kMotionPlane),
+    planes.previous_z = picture.plane<float>(gpu::kPreviousZPlane);
+  return planes;
+}
+
+PointPlanes GpuTracer::read_points(const gpu::DeviceView& picture) const {
+  const std::lock_guard lock(device_rays_mutex_);
+  device_rays_->read_points(picture);
+  return {picture.plane<Vec3>(gpu::kPositionPlane), picture.plane<Vec3>(gpu::kGeometricPlane),
+          picture.plane<float>(gpu::kOffsetPlane)};
 }
 
 /// Traces the rays of all points, of as many at once as there is memory for.
