@@ -57,7 +57,7 @@ void expect_embree_agrees(const BakedScene& scene, const PackedTracer& tracer, c
 TEST(DeformedTree, EachFrameIsHitWhereEmbreeHitsItsDecodedVertices) {
   for (const uint32_t instances : {1u, 4u, 20u}) {
     const BakedScene scene(moving_scene(instances));
-    const std::vector<Motion> frames = waves(6);
+    const std::vector<Motion> frames = waves(test::sanitized() ? 2 : 6);
     const DeformingGeometry moving = range_of(scene.file, kMovingSphere, frames);
     for (const PackedIsa isa : isas()) {
       PackedTracer tracer(scene.file, scene.source, {&moving, 1}, {}, isa);
@@ -78,7 +78,7 @@ TEST(DeformedTree, AllInstructionSetsFindTheSame) {
   std::vector<RayHit> expected;
   for (const PackedIsa isa : isas()) {
     PackedTracer tracer(scene.file, scene.source, {&moving, 1}, {}, isa);
-    const std::vector<Ray> rays = random_rays(20000, kNear, tracer.space(), 3);
+    const std::vector<Ray> rays = random_rays(test::fewer(20000u), kNear, tracer.space(), 3);
     for (const Motion& frame : frames) tracer.deform(kMovingSphere, MovedVertices(scene.file, moving, frame));
     const std::vector<RayHit> hits = closest(tracer, rays);
     if (expected.empty()) expected = hits;

@@ -16,7 +16,7 @@ using test::add_object;
 using test::add_shape;
 using test::placed;
 
-constexpr size_t kRays = 20000;
+const size_t kRays = test::fewer(size_t{20000});
 
 size_t usual_count(const Scene& scene) { return scene.shapes.size() + scene.instances.size(); }
 

@@ -19,7 +19,7 @@ using test::closest;
 constexpr size_t kManyRays = 1'000'000, kRaysPerPrecision = 100'000;
 
 /// One ray of so many is traced: they are slow under sanitizers, and builds without them find rare leaks.
-const size_t kRayShare = test::sanitized() ? 10 : 1;
+const size_t kRayShare = test::sanitized() ? 50 : 1;
 
 /// Rays from inside a closed mesh to its vertices, to points on its edges and elsewhere, and along the axes. All must
 /// hit.

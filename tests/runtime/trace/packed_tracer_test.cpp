@@ -70,7 +70,7 @@ TEST(PackedTracer, FindsWhatEmbreeFinds) {
 TEST(PackedTracer, FindsTheSameWithAllInstructionSets) {
   const BakedScene baked(varied_scene());
   const PackedTracer truth(baked.file, baked.source, PackedIsa::kScalar);
-  const std::vector<Ray> rays = random_rays(30000, {{-9, -1, -9}, {9, 6, 9}}, truth.space(), 5);
+  const std::vector<Ray> rays = random_rays(test::fewer(30000u), {{-9, -1, -9}, {9, 6, 9}}, truth.space(), 5);
   const std::vector<RayHit> expected = closest(truth, rays);
   const std::vector<uint8_t> occluded = any(truth, rays);
   for (const PackedIsa isa : isas()) {
@@ -109,20 +109,22 @@ TEST(PackedTracer, BeamsFindWhatTheirRaysFind) {
           const std::vector<Ray> rays = cone(tracer.space(), from, towards, width);
           const std::vector<RayHit> together = closest(tracer, rays);
           std::vector<RayHit> alone(rays.size());
-          for (size_t i = 0; i < rays.size(); ++i)
+          const size_t step = test::sanitized() ? 13 : 1; // of the rays that are traced alone, too
+          for (size_t i = 0; i < rays.size(); i += step) {
             tracer.closest_hits({&rays[i], 1}, kCameraRays, RayOrder::kCoherent, {&alone[i], 1});
-          EXPECT_EQ(std::memcmp(together.data(), alone.data(), rays.size() * sizeof(RayHit)), 0) << tracer.isa();
-          hits += static_cast<size_t>(
-              std::count_if(alone.begin(), alone.end(), [](const RayHit& hit) { return hit.valid(); }));
+            EXPECT_EQ(std::memcmp(&together[i], &alone[i], sizeof(RayHit)), 0) << tracer.isa() << " ray " << i;
+            hits += alone[i].valid();
+          }
         }
-    EXPECT_GT(hits, test::sanitized() ? 10000u : 30000u);
+    EXPECT_GT(hits, test::sanitized() ? 10000u / 13 : 30000u);
   }
 }
 
 TEST(PackedTracer, RaysAmongManyInstancesFindTogetherWhatTheyFindAlone) {
   const BakedScene baked(thicket_scene());
   const PackedTracer alone(baked.file, baked.source, PackedIsa::kScalar);
-  std::vector<Ray> rays = random_rays(10000, {{-6, 0, -6}, {6, 4, 6}}, alone.space(), 8);
+  const size_t count = test::sanitized() ? 2000 : 10000;
+  std::vector<Ray> rays = random_rays(count, {{-6, 0, -6}, {6, 4, 6}}, alone.space(), 8);
   for (size_t i = 0; i < rays.size(); i += 3) rays[i].tnear = 0.2f, rays[i].tfar = i % 2 == 0 ? 0.6f : 0.1f;
   for (const uint32_t ray_class : {kCameraRays, kOcclusionRays}) {
     std::vector<RayHit> hits(rays.size());
@@ -134,8 +136,8 @@ TEST(PackedTracer, RaysAmongManyInstancesFindTogetherWhatTheyFindAlone) {
       ASSERT_EQ(occluded[i] != 0, hits[i].valid());
       hit += hits[i].valid();
     }
-    EXPECT_GT(hit, 3000u);
-    EXPECT_LT(hit, 8000u);
+    EXPECT_GT(hit, 3 * count / 10);
+    EXPECT_LT(hit, 8 * count / 10);
     for (const PackedIsa isa : isas()) {
       const PackedTracer together(baked.file, baked.source, isa);
       EXPECT_EQ(std::memcmp(closest(together, rays, ray_class).data(), hits.data(), rays.size() * sizeof(RayHit)), 0);
@@ -211,14 +213,14 @@ TEST(PackedTracer, OfCoincidingSurfacesTheSameIsHitHoweverRaysCome) {
     const PackedTracer tracer(baked.file, baked.source, isa);
     std::mt19937 generator(3);
     std::uniform_real_distribution<double> along(-0.8, 2.5);
-    std::vector<Ray> rays(4000);
+    std::vector<Ray> rays(test::fewer(4000u));
     for (Ray& ray : rays) { // far enough away that origins are moved to the trees
       const DVec3 to = tracer.space().to_unit({along(generator), along(generator), 0});
       const DVec3 from = tracer.space().to_unit({9 * along(generator), 9 * along(generator), 100});
       ray.origin = Vec3(from), ray.direction = Vec3(to - from);
     }
     const std::vector<RayHit> together = closest(tracer, rays);
-    EXPECT_GT(std::ranges::count_if(together, [](const RayHit& hit) { return hit.valid(); }), 2500);
+    EXPECT_GT(std::ranges::count_if(together, [](const RayHit& hit) { return hit.valid(); }), test::fewer(2500));
     for (const size_t portion : {1u, 7u, 300u}) {
       std::vector<RayHit> hits(rays.size());
       for (size_t at = 0; at < rays.size(); at += portion) {
