@@ -18,15 +18,16 @@ namespace {
 class SampleRows {
 public:
   SampleRows(ImageSize size, int rows)
-      : stride_(static_cast<size_t>(size.width) + 2 * kPlaneBorder), data_(3 * static_cast<size_t>(rows) * stride_) {}
+      : stride_(static_cast<size_t>(size.width) + 2 * kPlaneBorder),
+        data_(3 * static_cast<size_t>(rows) * stride_ + kRunPadding) {}
   SampleRow row(int y) {
-    float* first = data_.data() + 3 * static_cast<size_t>(y) * stride_ + kPlaneBorder;
+    int32_t* first = data_.data() + 3 * static_cast<size_t>(y) * stride_ + kPlaneBorder;
     return {first, first + stride_, first + 2 * stride_};
   }
 
 private:
   size_t stride_;
-  std::vector<float> data_;
+  std::vector<int32_t> data_;
 };
 
 /// What one thread needs to update strips of rows.
@@ -52,7 +53,7 @@ public:
     if (input.motion != nullptr)
       kernels_.keep_trends(width_, &input.motion->motion_px[static_cast<size_t>(y) * static_cast<size_t>(width_)].x,
                            history.samples.row(y), reprojection_.weights(), trends);
-    update_trends(samples_.row(0).valid, history.mean.row(y), history.samples.row(y), input.longest, trends);
+    update_trends(samples_.row(0).value, history.mean.row(y), history.samples.row(y), input.longest, trends);
   }
 
   /// Updates rows [first, last). @param neighbour returns the samples of rows of other strips
@@ -97,9 +98,9 @@ private:
                         input.guides.disparity.row(y), {input.longest, terms_.fast_frames}, past, out, samples);
   }
 
-  void update_trends(const float* valid, const float* mean, const float* samples, float longest,
+  void update_trends(const int32_t* values, const float* mean, const float* samples, float longest,
                      uint32_t* trend) const {
-    const auto next = [&](int x) { return kernels_.next_crossing(x, width_, valid, samples, longest); };
+    const auto next = [&](int x) { return kernels_.next_crossing(x, width_, values, samples, longest); };
     for (int x = next(0); x < width_; x = next(x + 1)) trend[x] = next_trend(trend[x], mean[x], samples[x]);
   }
 

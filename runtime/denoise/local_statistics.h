@@ -9,7 +9,8 @@
 namespace packtrace {
 
 /// Computes sums over the windows around pixels, for rows in ascending order, with separable box filters. Each row
-/// is summed along x once; a ring buffer keeps the sums of the rows of the window. Use one object per thread.
+/// is summed along x once; a ring buffer keeps the sums of the rows of the window, and the sums over windows change by
+/// those of the rows that enter and leave them. Use one object per thread.
 class LocalStatisticsRows {
 public:
   /// @param width image width in pixels
@@ -22,17 +23,23 @@ public:
   /// Adds the next row of samples, valid up to kPlaneBorder pixels outside the image.
   void add(const SampleRow& samples);
   /// Adds a row outside the image.
-  void add_nothing();
+  void add_nothing() { add(nothing()); }
   /// Returns the sums over the windows of the row in the middle of the last rows added, valid until the next call.
-  WindowSums finish();
+  WindowRow finish();
 
 private:
   WindowSums sums(int slot);
+  SampleRow nothing() {
+    int32_t* row = nothing_.data() + kPlaneBorder;
+    return {row, row, row};
+  }
 
   const HistoryKernels& kernels_;
   int width_, radius_, next_ = 0;
-  size_t stride_;           // of rows, in pixels
-  std::vector<float> ring_; // [slot][quantity][x]; the last slot has the sums over windows
+  size_t stride_;             // of rows, in pixels
+  std::vector<int32_t> ring_; // [slot][quantity][x]
+  std::vector<int32_t> windows_, nothing_;
+  WindowRow row_; // of windows_
 };
 
 } // namespace packtrace

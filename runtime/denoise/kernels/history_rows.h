@@ -95,17 +95,27 @@ struct HistoryLengths {
   float slow, fast;
 };
 
+/// Samples, and sums of them, are whole numbers in units of 2^-17, so that sums over windows can follow from those of
+/// the windows above: sums of values have the number of samples above kCountShift bits.
+inline constexpr float kSampleUnits = 131072.0f;
+inline constexpr int kCountShift = 24;
+
 /// One row of a frame's samples. Pixels without a sample and those outside the image are 0.
 struct SampleRow {
-  float* ao;     ///< clamped to [0,1]
-  float* valid;  ///< 1 where the pixel has a sample
-  float* change; ///< fast minus slow history, both including this sample
+  int32_t* value;  ///< AO clamped to [0, 1], and 1 << kCountShift where the pixel has a sample
+  int32_t* square; ///< of the AO
+  int32_t* change; ///< fast minus slow history, both including this sample
 };
 
-/// Sums along x over the window, or over 3 pixels (narrow); or over whole windows: number of samples, their sum, sum of
-/// their squares, and sum of SampleRow::change.
+/// Sums along x over the window, or over 3 pixels (narrow).
 struct WindowSums {
-  float *count, *sum, *squares, *change, *narrow_count, *narrow_change;
+  int32_t *value, *square, *change, *narrow_value, *narrow_change;
+};
+
+/// Sums over the windows of the pixels of one row; for windows of 3 x 3 pixels those of three rows.
+struct WindowRow {
+  int32_t *value, *square, *change;
+  std::array<const int32_t*, 3> narrow_value, narrow_change;
 };
 
 struct CorrectTerms {
@@ -152,14 +162,16 @@ struct HistoryKernels {
   void (*keep_trends)(int width, const float* motion, const float* samples, const float* weights, uint32_t* trend);
   /// The first pixel from x on, before `width`, whose sample made its history, shorter than `longest`, reach or cross a
   /// power of two; or `width`.
-  int (*next_crossing)(int x, int width, const float* valid, const float* samples, float longest);
-  /// Sums along x, by the window's radius. Samples are read up to the radius outside the row.
-  std::array<void (*)(int width, const SampleRow& samples, const WindowSums& sums), kMaxWindowRadius + 1> sum;
-  /// Sums over windows, by their radius. All rows are followed by kRunPadding pixels.
-  /// @param rows sums of the window's rows, from top to bottom
-  std::array<void (*)(int width, const WindowSums* rows, const WindowSums& windows), kMaxWindowRadius + 1> add_windows;
+  int (*next_crossing)(int x, int width, const int32_t* values, const float* samples, float longest);
+  /// Sums along x, by the window's radius, and lets the windows follow. Samples are read up to the radius outside the
+  /// row.
+  /// @param sums in: of the row that leaves the windows; out: of the row that enters them
+  std::array<void (*)(int width, const SampleRow& samples, const WindowSums& sums, const WindowRow& windows),
+             kMaxWindowRadius + 1>
+      sum;
   /// Corrects a row of the history in place. Trends of corrected pixels become unknown.
-  void (*correct)(int width, const WindowSums& windows, const CorrectTerms& terms, const HistoryRow& history,
+  /// @param windows followed by kRunPadding pixels, as are all rows of sums
+  void (*correct)(int width, const WindowRow& windows, const CorrectTerms& terms, const HistoryRow& history,
                   uint32_t* trend);
 };
 

@@ -40,9 +40,10 @@ void accumulate_row(int width, const float* ao, const float* disparity, const Hi
     store_first_words(count, h.square + x, in_moment_units(old_square + (value * value - old_square) * share));
     store_first_words(count, h.fast + x, in_moment_units(fast));
     store_first(count, h.samples + x, select(valid, n, lesser(frames, all(most.slow))));
-    store_first(count, o.ao + x, value);
-    store_first(count, o.valid + x, select(valid, one, nothing));
-    store_first(count, o.change + x, select(valid, fast - mean, nothing));
+    const I32 units = truncated(value * kSampleUnits + 0.5f);
+    store_first(count, o.value + x, valid ? units + (1 << kCountShift) : I32{});
+    store_first(count, o.square + x, truncated(value * value * kSampleUnits + 0.5f));
+    store_first(count, o.change + x, truncated(select(valid, fast - mean, nothing) * kSampleUnits));
   }
 }
 
@@ -54,55 +55,28 @@ void keep_trends_row(int width, const float* motion, const float* samples, const
   }
 }
 
-int next_crossing(int x, int width, const float* valid, const float* samples, float longest) {
+int next_crossing(int x, int width, const int32_t* values, const float* samples, float longest) {
   return first_lane(x, width, [=](int at) {
     const F32 n = load(samples + at);
     const I32 crosses = n - (F32)((I32)n & 0x7f800000) < 1.0f; // crosses_power_of_two()
-    return both(both(crosses, n < longest), load(valid + at) > 0.0f);
+    return both(both(crosses, n < longest), load(values + at) > 0);
   });
 }
 
 template <int kRadius>
-void sum_windows(int width, const SampleRow& samples, const WindowSums& sums) {
-  const SampleRow s = samples;
-  const WindowSums o = sums;
-#pragma GCC ivdep
-  for (int x = 0; x < width; ++x) {
-    float count = s.valid[x - 1] + s.valid[x] + s.valid[x + 1];
-    float change = s.change[x - 1] + s.change[x] + s.change[x + 1];
-    float sum = s.ao[x], squares = s.ao[x] * s.ao[x];
-    o.narrow_count[x] = count;
-    o.narrow_change[x] = change;
-    for (int r = 1; r <= kRadius; ++r) {
-      if (r > 1) count += s.valid[x - r] + s.valid[x + r], change += s.change[x - r] + s.change[x + r];
-      sum += s.ao[x - r] + s.ao[x + r];
-      squares += s.ao[x - r] * s.ao[x - r] + s.ao[x + r] * s.ao[x + r];
+void sum_windows(int width, const SampleRow& samples, const WindowSums& sums, const WindowRow& windows) {
+  const auto sum = [width](const int32_t* in, int32_t* along_x, int32_t* window, int32_t* narrow) {
+    for (int x = 0; x < width; x += kFloats) {
+      I32 total = load(in + x) + (load(in + x - 1) + load(in + x + 1));
+      if (narrow != nullptr) store(narrow + x, total);
+      for (int r = 2; r <= kRadius; ++r) total += load(in + x - r) + load(in + x + r);
+      store(window + x, load(window + x) + (total - load(along_x + x)));
+      store(along_x + x, total);
     }
-    o.count[x] = count;
-    o.sum[x] = sum;
-    o.squares[x] = squares;
-    o.change[x] = change;
-  }
-}
-
-template <int kRadius>
-void add_windows(int width, const WindowSums* rows, const WindowSums& windows) {
-  std::array<WindowSums, 2 * kRadius + 1> r;
-  for (size_t i = 0; i < r.size(); ++i) r[i] = rows[i];
-  const WindowSums o = windows;
-  const auto add = [&](float* WindowSums::* sums, int x, size_t first, size_t last) {
-    F32 total = load(r[first].*sums + x);
-    for (size_t i = first + 1; i <= last; ++i) total += load(r[i].*sums + x);
-    store(o.*sums + x, total);
   };
-  for (int x = 0; x < width; x += kFloats) {
-    add(&WindowSums::count, x, 0, 2 * kRadius);
-    add(&WindowSums::sum, x, 0, 2 * kRadius);
-    add(&WindowSums::squares, x, 0, 2 * kRadius);
-    add(&WindowSums::change, x, 0, 2 * kRadius);
-    add(&WindowSums::narrow_count, x, kRadius - 1, kRadius + 1);
-    add(&WindowSums::narrow_change, x, kRadius - 1, kRadius + 1);
-  }
+  sum(samples.value, sums.value, windows.value, sums.narrow_value);
+  sum(samples.square, sums.square, windows.square, nullptr);
+  sum(samples.change, sums.change, windows.change, sums.narrow_change);
 }
 
 /// Reduces the magnitude of `change` by `limit`, at most to 0 (soft threshold).
@@ -117,10 +91,17 @@ struct Windows {
   F32 change, narrow_change;
   F32 sum, squares;
 
-  Windows(const WindowSums& w, int x)
-      : count(greater(load(w.count + x), all(1.0f))), narrow_count(greater(load(w.narrow_count + x), all(1.0f))),
-        change(load(w.change + x)), narrow_change(load(w.narrow_change + x)), sum(load(w.sum + x)),
-        squares(load(w.squares + x)) {}
+  Windows(const WindowRow& w, int x) {
+    const auto of_rows = [x](const std::array<const int32_t*, 3>& rows) {
+      return load(rows[0] + x) + load(rows[1] + x) + load(rows[2] + x);
+    };
+    const auto in_floats = [](I32 units) { return as_floats(units) * (1.0f / kSampleUnits); };
+    const auto count_of = [](I32 values) { return greater(as_floats((values >> kCountShift) & 127), all(1.0f)); };
+    const I32 values = load(w.value + x);
+    count = count_of(values), narrow_count = count_of(of_rows(w.narrow_value));
+    sum = in_floats(values & ((1 << kCountShift) - 1)), squares = in_floats(load(w.square + x));
+    change = in_floats(load(w.change + x)), narrow_change = in_floats(of_rows(w.narrow_change));
+  }
 
   /// Whether correction() might not be 0: its test, multiplied by count (count - 1), without divisions and roots. The
   /// least variance and the factor 1.001 allow for their roundings.
@@ -145,7 +126,7 @@ struct Windows {
   }
 };
 
-void correct_row(int width, const WindowSums& windows, const CorrectTerms& terms, const HistoryRow& history,
+void correct_row(int width, const WindowRow& windows, const CorrectTerms& terms, const HistoryRow& history,
                  uint32_t* trend) {
   const CorrectTerms t = terms;
   const HistoryRow h = history;
@@ -179,7 +160,6 @@ constexpr HistoryKernels history_table(std::integer_sequence<int, kPowers...>) {
           keep_trends_row,
           next_crossing,
           {nullptr, sum_windows<1>, sum_windows<2>, sum_windows<3>, sum_windows<4>},
-          {nullptr, add_windows<1>, add_windows<2>, add_windows<3>, add_windows<4>},
           correct_row};
 }
 

@@ -100,30 +100,36 @@ inline WantedSurfaces one_of(const WantedRow& w, int x) {
           I32{} + static_cast<uint16_t>(w.normal_z[x]), I32{} + static_cast<int32_t>(w.instance[x])};
 }
 
+/// Where the previous frame shows the same surface, and has a history.
+/// @param ignored bits in which instances may differ
+inline I32 shows(const PreviousPixels& p, ptrdiff_t at, const WantedSurfaces& w, int32_t ignored) {
+  const F32 there = load(p.disparity + at);
+  const I32 differs = (load(p.instance + at) ^ w.instance) & ~ignored;
+  const I32 near = magnitude(there - w.disparity) <= 2.0f * w.tolerance;
+  return both(both(lesser(there, load(p.samples + at)) > 0.0f, near), differs == 0);
+}
+
 /// Weighted sums of what the history has at the pixels around.
 struct HistorySums {
   F32 weight{}, mean{}, square{}, fast{}, samples{};
 
-  /// Weighted by similarity: 0 for another surface, up to 1 for a perfect match.
+  /// Weighted by similarity, up to 1 for a perfect match.
+  /// @param same shows()
   /// @param near weight of the pixels by their distance
-  /// @param ignored bits in which instances may differ
   template <int kSquarings>
-  void add(const PreviousPixels& p, ptrdiff_t at, const WantedSurfaces& w, F32 near, int32_t ignored) {
-    const F32 there = load(p.disparity + at), count = load(p.samples + at);
-    const F32 distance = magnitude(there - w.disparity);
+  void add(const PreviousPixels& p, ptrdiff_t at, const WantedSurfaces& w, I32 same, F32 near) {
+    const F32 distance = magnitude(load(p.disparity + at) - w.disparity);
     const I32 dot = sum_of_products(w.normal_xy, load_pairs(p.normal_x + at, p.normal_y + at)) +
                     sum_of_products(w.normal_z, load_wide(p.normal_z + at));
     F32 agreement = lesser(greater(as_floats(dot) * (1.1f * kSquaredNormalUnit), all(0.0f)), all(1.0f));
     for (int i = 0; i < kSquarings; ++i) agreement *= agreement;
     if (any_greater(distance, w.tolerance)) agreement *= w.tolerance / greater(distance, w.tolerance);
-    const I32 differs = (load(p.instance + at) ^ w.instance) & ~ignored;
-    const I32 same = both(both(lesser(there, count) > 0.0f, distance <= 2.0f * w.tolerance), differs == 0);
     const F32 part = select(same, near * agreement, all(0.0f));
     weight += part;
     mean += part * load(p.mean + at);
     square += part * as_floats(load_wide(p.square + at));
     fast += part * as_floats(load_wide(p.fast + at));
-    samples += part * count;
+    samples += part * load(p.samples + at);
   }
 };
 
@@ -142,7 +148,8 @@ void interpolate_run(int width, const PreviousPixels& from, const WantedRow& wan
     const F32 fx = load(w.at.fraction_x + x), fy = load(w.at.fraction_y + x), nothing{};
     HistorySums sums;
     const auto corner = [&](ptrdiff_t at, F32 bilinear) {
-      if (any_greater(bilinear, nothing)) sums.add<kSquarings>(p, at, surfaces, bilinear, ignored);
+      if (any_greater(bilinear, nothing))
+        sums.add<kSquarings>(p, at, surfaces, shows(p, at, surfaces, ignored), bilinear);
     };
     corner(x, (1.0f - fx) * (1.0f - fy));
     corner(x + 1, fx * (1.0f - fy));
@@ -229,11 +236,13 @@ void look_nearby(int x, const PreviousPixels& from, const WantedRow& wanted, boo
     const F32 away_x = as_floats(column + left) - fx;
     const I32 in_square = column < kSide;
     for (int dy = top; dy < top + kSide; ++dy) {
+      const ptrdiff_t at = x + dy * from.stride + left + i * kFloats;
+      const I32 same = both(in_square, shows(from, at, surface, ignored));
+      if (!any(same)) continue;
       const float away_y = static_cast<float>(dy) - fy;
       const F32 reach = 1.0f - (away_x * away_x + away_y * away_y) * (1.0f / (kNearbyReach * kNearbyReach));
-      const F32 near = select(in_square, greater(reach, F32{}), F32{});
-      columns[static_cast<size_t>(i)].add<kSquarings>(from, x + dy * from.stride + left + i * kFloats, surface,
-                                                      near * near, ignored);
+      const F32 near = greater(reach, F32{});
+      columns[static_cast<size_t>(i)].add<kSquarings>(from, at, surface, same, near * near);
     }
   }
   const auto sum = [&](F32 HistorySums::* sums) { return sum_of_columns(columns[0].*sums, columns[1].*sums); };

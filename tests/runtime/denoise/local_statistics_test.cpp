@@ -10,23 +10,26 @@ namespace {
 using synthetic::uniform;
 
 struct FrameSamples {
-  Plane<float> ao, valid, change;
-  void resize(ImageSize size) { ao.resize(size), valid.resize(size), change.resize(size); }
+  Plane<int32_t> value, square, change;
+  void resize(ImageSize size) { value.resize(size), square.resize(size), change.resize(size); }
 };
 
 /// Reference implementation: plain sums over the window.
 struct Reference {
-  double count = 0, sum = 0, squares = 0, change = 0;
+  uint32_t value = 0;
+  int32_t square = 0, change = 0;
 
   Reference(const FrameSamples& s, int x, int y, int radius) {
     for (int v = y - radius; v <= y + radius; ++v)
-      for (int u = x - radius; u <= x + radius; ++u) {
-        const double ao = static_cast<double>(s.ao.row(v)[u]);
-        count += static_cast<double>(s.valid.row(v)[u]), sum += ao, squares += ao * ao;
-        change += static_cast<double>(s.change.row(v)[u]);
-      }
+      for (int u = x - radius; u <= x + radius; ++u)
+        value += static_cast<uint32_t>(s.value.row(v)[u]), square += s.square.row(v)[u], change += s.change.row(v)[u];
   }
 };
+
+/// The sum of three rows at x.
+uint32_t sum_at(const std::array<const int32_t*, 3>& rows, int x) {
+  return static_cast<uint32_t>(rows[0][x]) + static_cast<uint32_t>(rows[1][x]) + static_cast<uint32_t>(rows[2][x]);
+}
 
 TEST(LocalStatistics, AreThoseOfTheSamplesInTheWindow) {
   const ImageSize size{29, 41};
@@ -34,10 +37,12 @@ TEST(LocalStatistics, AreThoseOfTheSamplesInTheWindow) {
   samples.resize(size);
   for (uint32_t y = 0; y < size.height; ++y)
     for (uint32_t x = 0; x < size.width; ++x) {
-      if (uniform(x, y, 0) < 0.5f || y > 30) continue; // some windows get no samples at all
-      samples.ao.row(static_cast<int>(y))[x] = uniform(x, y, 1);
-      samples.valid.row(static_cast<int>(y))[x] = 1.0f;
-      samples.change.row(static_cast<int>(y))[x] = uniform(x, y, 2) - 0.5f;
+      if (y < 16 && uniform(x, y, 0) < 0.5f) continue;
+      if (y > 30) continue;                              // some windows get no samples at all
+      const float ao = y > 15 ? 1.0f : uniform(x, y, 1); // large sums do not reach the counts
+      samples.value.row(static_cast<int>(y))[x] = static_cast<int32_t>(ao * kSampleUnits) + (1 << kCountShift);
+      samples.square.row(static_cast<int>(y))[x] = static_cast<int32_t>(ao * ao * kSampleUnits);
+      samples.change.row(static_cast<int>(y))[x] = static_cast<int32_t>((2 * uniform(x, y, 2) - 1) * kSampleUnits);
     }
   for (const uint32_t window : {3u, 5u, 7u, 9u}) {
     LocalStatisticsRows rows(size.width, window, history_kernels(chosen_isa()));
@@ -48,18 +53,17 @@ TEST(LocalStatistics, AreThoseOfTheSamplesInTheWindow) {
         if (added < 0 || added >= height)
           rows.add_nothing();
         else
-          rows.add({samples.ao.row(added), samples.valid.row(added), samples.change.row(added)});
+          rows.add({samples.value.row(added), samples.square.row(added), samples.change.row(added)});
         const int y = added - radius;
         if (y < first) continue;
-        const WindowSums sums = rows.finish();
+        const WindowRow sums = rows.finish();
         for (int x = 0; x < static_cast<int>(size.width); ++x) {
           const Reference wide(samples, x, y, static_cast<int>(window / 2)), narrow(samples, x, y, 1);
-          ASSERT_EQ(sums.count[x], wide.count);
-          ASSERT_EQ(sums.narrow_count[x], narrow.count);
-          ASSERT_NEAR(sums.sum[x], wide.sum, 1e-5) << x << ' ' << y << " window " << window;
-          ASSERT_NEAR(sums.squares[x], wide.squares, 1e-5);
-          ASSERT_NEAR(sums.change[x], wide.change, 1e-5);
-          ASSERT_NEAR(sums.narrow_change[x], narrow.change, 1e-5);
+          ASSERT_EQ(static_cast<uint32_t>(sums.value[x]), wide.value) << x << ' ' << y << " window " << window;
+          ASSERT_EQ(sums.square[x], wide.square);
+          ASSERT_EQ(sums.change[x], wide.change);
+          ASSERT_EQ(sum_at(sums.narrow_value, x), narrow.value);
+          ASSERT_EQ(sum_at(sums.narrow_change, x), static_cast<uint32_t>(narrow.change));
         }
       }
     }
