@@ -176,8 +176,8 @@ std::optional<SurfacePlanes> GpuTracer::make_surfaces(gpu::DeviceView& picture, 
   return planes;
 }
 
+/// Takes no lock: leave_occlusion() may call it through OcclusionPoints::write().
 PointPlanes GpuTracer::read_points(const gpu::DeviceView& picture) const {
-  const std::lock_guard lock(device_rays_mutex_);
   device_rays_->read_points(picture);
   return {picture.plane<Vec3>(gpu::kPositionPlane), picture.plane<Vec3>(gpu::kGeometricPlane),
           picture.plane<float>(gpu::kOffsetPlane)};
