@@ -118,7 +118,7 @@ uint64_t trace_view_occlusion(const ViewTracer& tracer, const UnitSpace& space, 
     OcclusionPoints points{count,
                            [&](size_t first, std::span<OcclusionPoint> out) { tiles.write(tracer, first, out); }};
     if (gbuffer.on_gpu)
-      points.surfaces = PictureSurfaces{gbuffer.on_gpu.get(), gbuffer.size, plan.colour, config.offset_scale};
+      points.surfaces = DeviceSurfaces{gbuffer.on_gpu.get(), gbuffer.size, plan.colour, config.offset_scale};
     ao.on_gpu = tracer.leave_occlusion(points, samples, {gbuffer.size.pixels(), double{radius}}, std::move(ao.on_gpu),
                                        progress);
     return count * uint64_t{plan.count};

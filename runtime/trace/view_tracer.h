@@ -28,7 +28,7 @@ struct OcclusionPoint {
 };
 
 /// Surfaces of a picture on a device, of which the device can make the points itself.
-struct PictureSurfaces {
+struct DeviceSurfaces {
   const gpu::DeviceView* picture;
   ImageSize size;
   std::optional<uint32_t> colour; ///< SamplePlan::colour
@@ -40,7 +40,7 @@ struct OcclusionPoints {
   size_t count = 0;
   /// Writes points [first, first + out.size()). It may use all cores.
   std::function<void(size_t first, std::span<OcclusionPoint> out)> write;
-  std::optional<PictureSurfaces> surfaces = std::nullopt; ///< with the same points
+  std::optional<DeviceSurfaces> surfaces = std::nullopt; ///< with the same points
 };
 
 /// Arrays of a GBuffer that a tracer made, one entry per pixel, rows top to bottom. Valid until the picture's memory is

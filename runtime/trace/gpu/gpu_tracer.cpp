@@ -234,7 +234,7 @@ void GpuTracer::trace_points(const OcclusionSamples& samples, const std::functio
 bool GpuTracer::trace_picture(const OcclusionPoints& points, const OcclusionSamples& samples,
                               Progress& progress) const {
   if (!points.surfaces || !points.surfaces->picture->has_surfaces()) return false;
-  const PictureSurfaces& surfaces = *points.surfaces;
+  const DeviceSurfaces& surfaces = *points.surfaces;
   gpu::PicturePointsRecord record{};
   for (int axis = 0; axis < 3; ++axis) record.centre[axis] = space().centre()[axis];
   record.scale = space().scale();
