@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <tuple>
 #include <vector>
 
 #include "runtime/camera/device_surfaces.h"
+#include "runtime/camera/gbuffer_rows.h"
+#include "runtime/camera/hit_triangles.h"
 #include "runtime/camera/ray_columns.h"
 #include "runtime/camera/surface_motion.h"
 #include "runtime/camera/tiles.h"
@@ -20,17 +23,29 @@ constexpr uint32_t kBatch = kTileSize * kBlock; ///< rays per query: a row of bl
 constexpr uint32_t kTileRows = kTileSize / kBlock;
 static_assert(kTileSize % kBlock == 0 && kBatch <= kMaxColumnRays);
 
-/// The rays of a row of blocks. Pixels of a block outside the image get rays that hit nothing (tfar < tnear).
+/// The rays of a row of blocks. Columns hold them by rows of `stride` pixels, a multiple of kBlock. Pixels outside the
+/// image get rays that hit nothing (tfar < tnear).
 struct RayBatch {
-  uint32_t count = 0;
+  uint32_t stride = 0, count = 0;
   RayColumns columns;
-  Ray rays[kBatch];
-  RayHit hits[kBatch];
-  HitSurface surfaces[kBatch];
-  uint32_t hit_count = 0;
-  uint32_t hit_rays[kBatch]; ///< by hit: index of its ray
-  SurfaceQuery places[kBatch];
-  SurfaceAttributes attributes[kBatch];
+  Ray rays[kBatch];    ///< block by block
+  RayHit hits[kBatch]; ///< of the rays
+  HitTriangles triangles;
+  PlacementRuns surfaces; ///< in the columns: placements that move surfaces alike
+  PlacementRuns normals;  ///< placements that turn normals alike
+
+  /// Calls work(element of the columns, number of its ray) for all pixels.
+  template <typename Work>
+  void for_each(const Work& work) const {
+    for (uint32_t row = 0; row < kBlock; ++row)
+      for (uint32_t x = 0; x < stride; x += kBlock)
+        for (uint32_t i = 0; i < kBlock; ++i) work(row * stride + x + i, x * kBlock + row * kBlock + i);
+  }
+  /// The number of the ray of an element.
+  uint32_t ray_of(uint32_t element) const {
+    const uint32_t x = element % stride, row = element / stride;
+    return x / kBlock * (kBlock * kBlock) + row * kBlock + x % kBlock;
+  }
 };
 
 /// @param spread PrimaryCamera::pixel_spread()
@@ -43,7 +58,7 @@ public:
   PrimaryTracer(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                 const PreviousFrame& previous, const TextureFilter& textures, GBuffer& out)
       : source_(source), tracer_(tracer), space_(tracer.space()), now_(now), motion_(source, tracer, now, previous),
-        textures_(textures), out_(out) {}
+        materials_(source.materials()), textures_(textures), out_(out) {}
 
   bool sees_motion() const { return motion_.any(); }
 
@@ -90,8 +105,9 @@ private:
     if (!view_hits_.empty()) {
       std::copy_n(&view_hits_[place_of(y0, tile)], batch.count, batch.hits);
     } else if (!pixel_hits_.empty()) {
-      for (uint32_t i = 0; i < batch.count; ++i)
-        batch.hits[i] = is_inside(i, tile, batch) ? pixel_hits_[pixel_of(i, batch)] : RayHit{};
+      batch.for_each([&](uint32_t i, uint32_t ray) {
+        batch.hits[ray] = is_inside(i, tile, batch) ? pixel_hits_[pixel_of(i, batch)] : RayHit{};
+      });
     } else {
       tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});
     }
@@ -103,19 +119,12 @@ private:
 
   void trace_row(uint32_t y0, const Tile& tile, RayBatch& batch) const {
     make_rays(y0, tile, batch);
+    const uint32_t rows = std::min(kBlock, tile.y1 - y0);
+    for (uint32_t row = 0; row < rows; ++row) fetch_row({row * batch.stride, tile.x1 - tile.x0}, batch);
     find_hits(y0, tile, batch);
-    batch.hit_count = 0;
-    for (uint32_t i = 0; i < batch.count; ++i) {
-      if (batch.hits[i].valid())
-        add_hit(i, batch);
-      else
-        fill_in(i, batch.columns);
-    }
-    source_.look_up({batch.places, batch.hit_count}, {batch.attributes, batch.hit_count});
-    place_hits(batch);
-    for (uint32_t i = 0; i < batch.count; ++i)
-      if (!batch.hits[i].valid() && is_inside(i, tile, batch)) write_miss(pixel_of(i, batch));
-    for (uint32_t h = 0; h < batch.hit_count; ++h) write_hit(h, batch);
+    list_triangles(batch);
+    if (batch.triangles.count() > 0) place_hits(batch);
+    for (uint32_t row = 0; row < rows; ++row) write_row({row * batch.stride, tile.x1 - tile.x0}, batch);
   }
 
   /// Place of a tile's row of blocks in the rays of the whole picture.
@@ -127,18 +136,32 @@ private:
 
   void make_rays(uint32_t y0, const Tile& tile, RayBatch& batch) const {
     RayColumns& c = batch.columns;
-    batch.count = 0;
-    for (uint32_t x = tile.x0; x < tile.x1; x += kBlock)
-      for (uint32_t i = 0; i < kBlock * kBlock; ++i, ++batch.count)
-        c.x[batch.count] = x + i % kBlock, c.y[batch.count] = y0 + i / kBlock;
+    batch.stride = (tile.x1 - tile.x0 + kBlock - 1) / kBlock * kBlock;
+    batch.count = batch.stride * kBlock;
+    for (uint32_t y = 0; y < kBlock; ++y) {
+      std::iota(c.x + y * batch.stride, c.x + (y + 1) * batch.stride, tile.x0);
+      std::fill_n(c.y + y * batch.stride, batch.stride, y0 + y);
+    }
     write_rays(now_, space_, batch.count, c);
-    for (uint32_t i = 0; i < batch.count; ++i) {
+    if (!start_near(batch.count, c)) return approach(tile, batch);
+    const bool whole = tile.x1 - tile.x0 == batch.stride && tile.y1 - y0 >= kBlock;
+    batch.for_each(
+        [&](uint32_t i, uint32_t ray) { batch.rays[ray] = ray_at(i, whole || is_inside(i, tile, batch), c); });
+  }
+
+  void approach(const Tile& tile, RayBatch& batch) const {
+    RayColumns& c = batch.columns;
+    batch.for_each([&](uint32_t i, uint32_t number) {
       CameraRay ray{c.origin.at(i), c.direction.at(i)};
       const bool traced = approach_scene(ray) && is_inside(i, tile, batch);
       c.origin.set(i, ray.origin);
-      batch.rays[i] = {Vec3(ray.origin), 0.0f, Vec3(ray.direction),
-                       traced ? std::numeric_limits<float>::infinity() : -1.0f};
-    }
+      batch.rays[number] = ray_at(i, traced, c);
+    });
+  }
+
+  static Ray ray_at(uint32_t i, bool traced, const RayColumns& c) {
+    return {Vec3(c.origin.at(i)), 0.0f, Vec3(c.direction.at(i)),
+            traced ? std::numeric_limits<float>::infinity() : -1.0f};
   }
 
   bool keeps(GBufferChannel channel) const { return (out_.channels & channel) != 0; }
@@ -147,109 +170,126 @@ private:
     return static_cast<size_t>(batch.columns.y[i] - top_) * out_.size.width + (batch.columns.x[i] - left_);
   }
 
-  void add_hit(uint32_t i, RayBatch& batch) const {
+  /// Finds the triangles that the rays hit.
+  static void list_triangles(RayBatch& batch) {
     RayColumns& c = batch.columns;
-    const uint32_t h = batch.hit_count++;
-    batch.hit_rays[h] = i;
-    const HitSurface& hit = batch.surfaces[i] = surface_of(i, h, batch);
-    batch.places[h] = {hit.placement->instance, hit.triangle, Vec2(batch.hits[i].u, batch.hits[i].v)};
-    for (int corner = 0; corner < 3; ++corner)
-      for (int axis = 0; axis < 3; ++axis) c.vertex[corner][axis][i] = hit.vertices[corner][axis];
-    c.u[i] = batch.hits[i].u, c.v[i] = batch.hits[i].v;
-    c.instanced[i] = hit.placement->instanced;
-    c.surface_offset[i] = 0.0;
-  }
-
-  /// Decodes the surface that a ray hit, unless the hit before was on the same triangle.
-  /// @param h number of hits before
-  HitSurface surface_of(uint32_t i, uint32_t h, const RayBatch& batch) const {
-    const RayHit& hit = batch.hits[i];
-    if (h > 0) {
-      const uint32_t last = batch.hit_rays[h - 1];
-      const RayHit& before = batch.hits[last];
-      if (hit.triangle == before.triangle && hit.part == before.part && hit.placement == before.placement)
-        return batch.surfaces[last];
-    }
-    return tracer_.resolve(hit);
-  }
-
-  /// Sets what vectorised loops read of a ray that missed.
-  static void fill_in(uint32_t i, RayColumns& c) {
-    for (int corner = 0; corner < 3; ++corner)
-      for (int axis = 0; axis < 3; ++axis) c.vertex[corner][axis][i] = 0.0f;
-    c.u[i] = c.v[i] = 0.0f;
-    c.instanced[i] = 0;
-    c.surface_offset[i] = 0.0;
+    batch.triangles.clear();
+    int32_t last = 0;
+    batch.for_each([&](uint32_t i, uint32_t ray) {
+      const RayHit& hit = batch.hits[ray];
+      const bool valid = hit.valid();
+      if (valid) last = static_cast<int32_t>(batch.triangles.number_of(hit));
+      c.hit[i] = valid, c.triangle[i] = last;
+      c.u[i] = hit.u, c.v[i] = hit.v;
+    });
   }
 
   /// Computes the surface points of all hits.
   void place_hits(RayBatch& batch) const {
     RayColumns& c = batch.columns;
-    span_triangles(batch.count, c);
-    for (uint32_t h = 0; h < batch.hit_count; ++h) {
-      const uint32_t i = batch.hit_rays[h];
-      if (c.instanced[i] == 0) continue;
-      const Placement& placement = *batch.surfaces[i].placement;
-      c.own_normal.set(i, placement.surface_normal * c.own_normal.at(i));
-      c.from_barycentrics.set(i, transform_point(placement.unit_from_surface, c.from_barycentrics.at(i)));
-    }
-    meet_planes(batch.count, c);
-    for (uint32_t h = 0; h < batch.hit_count; ++h)
-      if (const uint32_t i = batch.hit_rays[h]; c.instanced[i] != 0)
-        c.surface_offset[i] = surface_offset(batch.surfaces[i], c.point.at(i), c.normal.at(i));
-    place_points(now_, space_, batch.count, c);
+    batch.triangles.resolve(tracer_, source_);
+    gather_vertices(batch.triangles.columns(), batch.count, c);
+    batch.surfaces.sort(batch.triangles, [](const Placement& a, const Placement& b) {
+      return a.instanced == b.instanced && a.unit_from_surface == b.unit_from_surface &&
+             a.surface_normal == b.surface_normal && a.moved_linear == b.moved_linear &&
+             a.moved_offset == b.moved_offset;
+    });
+    batch.surfaces.for_each(c.triangle, batch.count, [&](const Placement& placement, uint32_t first, uint32_t count) {
+      meet_surfaces(placement, space_, first, count, c);
+    });
+    place_normals(batch);
+    write_depths(now_, batch.count, c);
     if (motion_.any()) motion_.move_with_camera(batch.count, c);
   }
 
-  void write_miss(size_t pixel) const {
-    out_.view_z[pixel] = 0.0f;
-    out_.position[pixel] = out_.geometric_normal[pixel] = out_.normal[pixel] = Vec3(0);
-    out_.instance[pixel] = kNoInstance;
-    if (keeps(kAlbedoChannel)) out_.albedo[pixel] = Vec3(0);
-    if (keeps(kTriangleChannel)) out_.triangle[pixel] = 0;
-    if (keeps(kMaterialChannel)) out_.material[pixel] = 0;
-    if (keeps(kBackFaceChannel)) out_.back_face[pixel] = 0;
-    out_.offset[pixel] = 0.0f;
-    out_.motion_px[pixel] = Vec2(0);
-    if (motion_.any()) out_.previous_z[pixel] = 0.0f;
-  }
-
-  void write_hit(uint32_t h, const RayBatch& batch) const {
-    const uint32_t i = batch.hit_rays[h];
-    const RayColumns& c = batch.columns;
-    const HitSurface& hit = batch.surfaces[i];
-    const SurfaceAttributes& attributes = batch.attributes[h];
-    const size_t pixel = pixel_of(i, batch);
-    const DVec3 facing = c.normal.at(i);
-    const float view_z = std::max(static_cast<float>(c.view_z[i]), std::numeric_limits<float>::denorm_min());
-
-    out_.view_z[pixel] = view_z;
-    out_.position[pixel] = Vec3(c.position.at(i));
-    out_.geometric_normal[pixel] = Vec3(facing);
-    out_.normal[pixel] = shading_normal(attributes, *hit.placement, facing);
-    if (keeps(kAlbedoChannel)) {
-      const float width = pixel_width(now_.projection(), out_.pixel_spread, view_z) * textures_.width_px *
-                          static_cast<float>(space_.scale());
-      out_.albedo[pixel] = surface_albedo(source_, textures_.pyramids, hit, attributes.material, Vec2(c.u[i], c.v[i]),
-                                          {batch.rays[i].direction, Vec3(facing), width});
-    }
-    out_.instance[pixel] = hit.placement->instance;
-    if (keeps(kTriangleChannel)) out_.triangle[pixel] = hit.triangle;
-    if (keeps(kMaterialChannel)) out_.material[pixel] = attributes.material;
-    if (keeps(kBackFaceChannel)) out_.back_face[pixel] = glm::dot(c.own_normal.at(i), facing) < 0.0;
-    out_.offset[pixel] = static_cast<float>(c.offset[i]);
-    if (motion_.any())
-      std::tie(out_.motion_px[pixel], out_.previous_z[pixel]) = motion_.of({batch.hits[i], hit, view_z, i, c});
+  void place_normals(RayBatch& batch) const {
+    RayColumns& c = batch.columns;
+    if (batch.triangles.has_normals())
+      interpolate_normals(batch.triangles.columns(), batch.count, c);
     else
-      out_.motion_px[pixel] = Vec2(0);
+      look_up_normals(batch);
+    batch.normals.sort(batch.triangles,
+                       [](const Placement& a, const Placement& b) { return a.object_normal == b.object_normal; });
+    batch.normals.for_each(c.triangle, batch.count, [&](const Placement& placement, uint32_t first, uint32_t count) {
+      face_normals(placement.object_normal, first, count, c);
+    });
   }
 
-  static Vec3 shading_normal(const SurfaceAttributes& attributes, const Placement& placement, DVec3 geometric) {
-    if (!attributes.has_normal) return Vec3(geometric);
-    const DVec3 normal = placement.object_normal * DVec3(attributes.normal);
-    const double length = glm::length(normal);
-    if (!(length > 0.0)) return Vec3(geometric);
-    return Vec3(normal * ((glm::dot(normal, geometric) < 0.0 ? -1.0 : 1.0) / length));
+  void look_up_normals(RayBatch& batch) const {
+    RayColumns& c = batch.columns;
+    for (uint32_t i = 0; i < batch.count; ++i) {
+      std::optional<Vec3> normal;
+      if (c.hit[i] != 0) {
+        const HitSurface& surface = batch.triangles.surface(c.triangle[i]);
+        normal = source_.shading_normal(surface.geometry, surface.triangle, Vec2(c.u[i], c.v[i]));
+      }
+      c.has_normal[i] = normal.has_value();
+      for (int axis = 0; axis < 3; ++axis) c.object_normal[axis][i] = normal ? (*normal)[axis] : 0.0f;
+    }
+  }
+
+  /// Moves pixels of a row near, while the rays are traced: their memory is mostly in no cache.
+  void fetch_row(ColumnRow row, const RayBatch& batch) const {
+    const size_t pixel = pixel_of(row.first, batch);
+    const auto fetch = [&](auto& channel) {
+      constexpr size_t kLine = 64;
+      if (channel.empty()) return;
+      const char* const first = reinterpret_cast<const char*>(&channel[pixel]);
+      for (size_t at = 0; at < row.count * sizeof(channel[0]); at += kLine) __builtin_prefetch(first + at, 1);
+    };
+    fetch(out_.view_z), fetch(out_.position), fetch(out_.geometric_normal), fetch(out_.normal), fetch(out_.instance);
+    fetch(out_.offset), fetch(out_.motion_px), fetch(out_.previous_z), fetch(out_.albedo), fetch(out_.triangle);
+    fetch(out_.material);
+  }
+
+  /// Writes pixels of a row.
+  void write_row(ColumnRow row, const RayBatch& batch) const {
+    const RayColumns& c = batch.columns;
+    const HitTriangles& triangles = batch.triangles;
+    const size_t pixel = pixel_of(row.first, batch);
+    const uint32_t *instances = triangles.instances(), *materials = triangles.materials();
+    write_depths(c, row, &out_.view_z[pixel]);
+    write_vectors(c.position, c, row, &out_.position[pixel]);
+    write_vectors(c.normal, c, row, &out_.geometric_normal[pixel]);
+    write_normals(c, row, &out_.normal[pixel]);
+    write_of_triangles(instances, kNoInstance, c, row, &out_.instance[pixel]);
+    write_numbers(c.offset, c, row, &out_.offset[pixel]);
+    if (keeps(kTriangleChannel)) write_of_triangles(triangles.triangles(), 0, c, row, &out_.triangle[pixel]);
+    if (keeps(kMaterialChannel)) write_of_triangles(materials, 0, c, row, &out_.material[pixel]);
+    if (keeps(kBackFaceChannel)) write_back_faces(c, row, &out_.back_face[pixel]);
+    if (keeps(kAlbedoChannel))
+      for (uint32_t i = 0; i < row.count; ++i) out_.albedo[pixel + i] = albedo(row.first + i, pixel + i, batch);
+    write_motions(row, pixel, batch);
+  }
+
+  Vec3 albedo(uint32_t i, size_t pixel, const RayBatch& batch) const {
+    const RayColumns& c = batch.columns;
+    if (c.hit[i] == 0) return Vec3(0);
+    const auto triangle = static_cast<uint32_t>(c.triangle[i]);
+    const uint32_t material = batch.triangles.materials()[triangle];
+    if (const Material& m = materials_[material]; m.albedo_texture == kNoTexture) return m.albedo;
+    const float width = pixel_width(now_.projection(), out_.pixel_spread, out_.view_z[pixel]) * textures_.width_px *
+                        static_cast<float>(space_.scale());
+    return surface_albedo(source_, textures_.pyramids, batch.triangles.surface(triangle), material,
+                          Vec2(c.u[i], c.v[i]), {Vec3(c.direction.at(i)), Vec3(c.normal.at(i)), width});
+  }
+
+  void write_motions(ColumnRow row, size_t pixel, const RayBatch& batch) const {
+    const RayColumns& c = batch.columns;
+    if (motion_.camera_moved()) {
+      write_motion(c, row, &out_.motion_px[pixel]);
+      write_numbers(c.previous_z, c, row, &out_.previous_z[pixel]);
+    } else {
+      std::fill_n(&out_.motion_px[pixel], row.count, Vec2(0));
+      if (motion_.any()) std::copy_n(&out_.view_z[pixel], row.count, &out_.previous_z[pixel]);
+    }
+    if (!motion_.of_surfaces()) return;
+    for (uint32_t i = row.first; i < row.first + row.count; ++i, ++pixel) {
+      if (c.hit[i] == 0) continue;
+      const HitSurface& surface = batch.triangles.surface(static_cast<uint32_t>(c.triangle[i]));
+      std::tie(out_.motion_px[pixel], out_.previous_z[pixel]) =
+          motion_.of({batch.hits[batch.ray_of(i)], surface, out_.view_z[pixel], i, c});
+    }
   }
 
   const SceneSource& source_;
@@ -257,6 +297,7 @@ private:
   const UnitSpace space_;
   const PrimaryCamera& now_;
   const SurfaceMotion motion_;
+  const std::span<const Material> materials_;
   const TextureFilter textures_;
   GBuffer& out_;
   uint32_t left_ = 0, top_ = 0;        ///< pixel of the image at which out_ begins

@@ -26,6 +26,10 @@ public:
   /// False if nothing moved: motion is zero everywhere.
   bool any() const { return any_; }
 
+  bool camera_moved() const { return camera_moved_; }
+  /// Whether surfaces may have moved: of() then differs from what move_with_camera() writes.
+  bool of_surfaces() const { return !previous_.world_from_object.empty() || previous_.surfaces != nullptr; }
+
   /// Writes the motion of all points as if only the camera had moved.
   void move_with_camera(uint32_t count, RayColumns& columns) const {
     if (camera_moved_) packtrace::move_with_camera(previous_.camera, double{kNoMotionPx}, count, columns);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {
@@ -20,17 +22,26 @@ namespace packtrace {
 /// @param normal unit length, in unit space
 double ray_offset(const HitSurface& hit, const UnitSpace& space, DVec3 position, DVec3 normal);
 
-/// d_surface of a hit on an instanced placement, in unit-space lengths.
-double surface_offset(const HitSurface& hit, DVec3 position, DVec3 normal);
+/// Returns the absolute values of components, without a comparison.
+inline DVec3 magnitudes(DVec3 v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
+
+/// d_surface of a hit on an instanced placement, in unit-space lengths; inline, so that loops over hits can be
+/// vectorised.
+/// @param largest absolute coordinates of the triangle's vertices and of the moved point, whichever are larger
+/// @param linear linear part of Placement::unit_from_surface
+inline double surface_offset(DVec3 largest, const glm::dmat3& linear, DVec3 normal) {
+  // An error e in surface coordinates is L e in unit space, and n . L e along the normal. In GLM, normal * L is L^T n.
+  return glm::dot(magnitudes(normal * linear), largest);
+}
 
 /// The offset from its parts; inline, so that loops over hits can be vectorised.
 /// @param vertices largest absolute coordinates of the triangle's vertices; 0 for instanced placements
 /// @param surface surface_offset(); 0 for other placements
 inline double ray_offset(DVec3 vertices, double surface, const UnitSpace& space, DVec3 position, DVec3 normal) {
   constexpr double kEpsilon = 0x1p-23, kUlps = 4.0;
-  const DVec3 in_world = glm::abs(space.from_unit(position)) * space.scale();
-  const DVec3 magnitude = glm::max(glm::max(glm::abs(position), in_world), vertices);
-  const double distance = surface + glm::dot(glm::abs(normal), magnitude);
+  const DVec3 in_world = magnitudes(space.from_unit(position)) * space.scale();
+  const DVec3 magnitude = glm::max(glm::max(magnitudes(position), in_world), vertices);
+  const double distance = surface + glm::dot(magnitudes(normal), magnitude);
   return kEpsilon * (kUlps * distance + glm::max(glm::max(in_world.x, in_world.y), in_world.z));
 }
 

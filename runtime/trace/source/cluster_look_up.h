@@ -34,4 +34,23 @@ void look_up_in_clusters(const BakedFile& file, std::span<const PlacedGeometry> 
   }
 }
 
+/// SceneSource::look_up_triangles() for them. Neighbours in the same cluster find and unpack it once.
+/// @param find as above
+template <typename Find>
+void look_up_triangles_in_clusters(const BakedFile& file, std::span<const PlacedGeometry> instances,
+                                   std::span<const SurfaceQuery> places, std::span<TriangleAttributes> out,
+                                   const Find& find) {
+  std::optional<ClusterView> cluster;
+  uint32_t geometry = 0, first = 0;
+  for (size_t i = 0; i < places.size(); ++i) {
+    const SurfaceQuery& place = places[i];
+    const uint32_t own = instances[place.instance].geometry;
+    if (!cluster || own != geometry || place.triangle - first >= cluster->triangle_count())
+      cluster.emplace(find(geometry = own, place.triangle, first));
+    out[i].material = file.instance_materials(place.instance)[cluster->material_slot()];
+    out[i].normals = {Vec3(0.0f), Vec3(0.0f), Vec3(0.0f)};
+    if (cluster->has_normals()) out[i].normals = TriangleNormals(*cluster, place.triangle - first).corners;
+  }
+}
+
 } // namespace packtrace

@@ -144,6 +144,15 @@ void LodSource::look_up(std::span<const SurfaceQuery> places, std::span<SurfaceA
   });
 }
 
+bool LodSource::look_up_triangles(std::span<const SurfaceQuery> places, std::span<TriangleAttributes> out) const {
+  look_up_triangles_in_clusters(file_, instances_, places, out, [&](uint32_t blas, uint32_t triangle, uint32_t& first) {
+    const BlasCluster& c = find(blas, triangle);
+    first = c.first_triangle;
+    return view(c);
+  });
+  return true;
+}
+
 std::array<Vec2, 3> LodSource::corner_uvs(uint32_t blas, uint32_t triangle) const {
   const BlasCluster& c = find(blas, triangle);
   return packtrace::corner_uvs(view(c), triangle - c.first_triangle);

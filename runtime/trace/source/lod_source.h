@@ -47,6 +47,7 @@ public:
   uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t blas, uint32_t triangle, Vec2 barycentrics) const override;
   void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const override;
+  bool look_up_triangles(std::span<const SurfaceQuery> places, std::span<TriangleAttributes> out) const override;
   std::array<Vec2, 3> corner_uvs(uint32_t blas, uint32_t triangle) const override;
   float position_error(uint32_t blas) const override { return source_.position_error(blas_[blas].geometry); }
   SurfaceDetail detail_of(uint32_t instance, uint32_t triangle) const override;

@@ -17,8 +17,7 @@ TriangleNormals::TriangleNormals(const ClusterView& cluster, uint32_t triangle) 
 }
 
 std::optional<Vec3> TriangleNormals::at(Vec2 barycentrics) const {
-  const Vec3 n =
-      corners[0] * (1.0f - barycentrics.x - barycentrics.y) + corners[1] * barycentrics.x + corners[2] * barycentrics.y;
+  const Vec3 n = packtrace::interpolated_normal(corners[0], corners[1], corners[2], barycentrics.x, barycentrics.y);
   const float length = glm::length(n);
   if (!(length > 0.0f)) return std::nullopt; // Opposite vertex normals cancel.
   return n / length;
@@ -76,10 +75,21 @@ std::optional<Vec3> PackedSource::shading_normal(uint32_t geometry, uint32_t tri
 
 void PackedSource::look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const {
   look_up_in_clusters(file_, instances_, places, out, [&](uint32_t geometry, uint32_t triangle, uint32_t& first) {
-    const ClusterView cluster = file_.cluster(geometry, file_.cluster_of_triangle(geometry, triangle));
-    first = cluster.record().first_triangle;
-    return cluster;
+    return find(geometry, triangle, first);
   });
+}
+
+bool PackedSource::look_up_triangles(std::span<const SurfaceQuery> places, std::span<TriangleAttributes> out) const {
+  look_up_triangles_in_clusters(
+      file_, instances_, places, out,
+      [&](uint32_t geometry, uint32_t triangle, uint32_t& first) { return find(geometry, triangle, first); });
+  return true;
+}
+
+ClusterView PackedSource::find(uint32_t geometry, uint32_t triangle, uint32_t& first) const {
+  const ClusterView cluster = file_.cluster(geometry, file_.cluster_of_triangle(geometry, triangle));
+  first = cluster.record().first_triangle;
+  return cluster;
 }
 
 std::array<Vec2, 3> PackedSource::corner_uvs(uint32_t geometry, uint32_t triangle) const {

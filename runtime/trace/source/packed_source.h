@@ -20,7 +20,7 @@ struct TriangleNormals {
   /// @param barycentrics weights of the triangle's second and third vertex
   std::optional<Vec3> at(Vec2 barycentrics) const;
 
-  Vec3 corners[3];
+  std::array<Vec3, 3> corners;
 };
 
 /// Returns the interpolated vertex normal, unit length; none if the cluster has no normals or they cancel.
@@ -44,6 +44,7 @@ public:
   uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const override;
+  bool look_up_triangles(std::span<const SurfaceQuery> places, std::span<TriangleAttributes> out) const override;
   std::array<Vec2, 3> corner_uvs(uint32_t geometry, uint32_t triangle) const override;
   float position_error(uint32_t geometry) const override;
   SurfaceDetail detail_of(uint32_t instance, uint32_t triangle) const override;
@@ -66,6 +67,9 @@ public:
   uint64_t resident_bytes() const override;
 
 private:
+  /// @param first out: the cluster's first triangle
+  ClusterView find(uint32_t geometry, uint32_t triangle, uint32_t& first) const;
+
   const BakedFile& file_;
   std::vector<Material> materials_;
   ShadingData shading_;

@@ -36,12 +36,22 @@ struct SurfaceAttributes {
   Vec3 normal{0.0f};
 };
 
+/// What look_up() interpolates on a triangle.
+struct TriangleAttributes {
+  uint32_t material = 0;
+  std::array<Vec3, 3> normals{Vec3(0), Vec3(0), Vec3(0)}; ///< of the corners, object space; 0 if the surface is flat
+};
+
 /// Interpolates texture coordinates.
 /// @param barycentrics weights of the second and third corner
 inline Vec2 interpolated_uv(const std::array<Vec2, 3>& corners, Vec2 barycentrics) {
   return corners[0] * (1.0f - barycentrics.x - barycentrics.y) + corners[1] * barycentrics.x +
          corners[2] * barycentrics.y;
 }
+
+/// Interpolates the normals of a triangle's corners in floats; the sum has no unit length and is 0 if they cancel.
+/// @param u, v weights of the second and third corner
+inline Vec3 interpolated_normal(Vec3 a, Vec3 b, Vec3 c, float u, float v) { return a * (1.0f - u - v) + b * u + c * v; }
 
 /// Memory of environment maps' pixels.
 inline uint64_t map_bytes(std::span<const EnvironmentMap> maps) {
@@ -85,6 +95,14 @@ public:
   /// together.
   /// @param out as many elements as `places`
   virtual void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const;
+
+  /// Returns the attributes of the triangles of points, whose normals interpolated_normal() interpolates as look_up()
+  /// does. Returns false, without result, if the source interpolates otherwise.
+  /// @param out as many elements as `places`
+  virtual bool look_up_triangles(std::span<const SurfaceQuery> /*places*/,
+                                 std::span<TriangleAttributes> /*out*/) const {
+    return false;
+  }
 
   /// Texture coordinates of a triangle's vertices; (0,0) if the geometry has none.
   virtual std::array<Vec2, 3> corner_uvs(uint32_t geometry, uint32_t triangle) const = 0;

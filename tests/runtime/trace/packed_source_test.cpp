@@ -87,6 +87,38 @@ TEST(PackedSource, LooksUpManyPlacesAsItDoesOne) {
   }
 }
 
+TEST(PackedSource, NormalsOfTrianglesInterpolateToThoseOfPlaces) {
+  const Scene scene = cubes_scene();
+  const BakedFile file = bake(scene);
+  const PackedSource source(file);
+  std::vector<SurfaceQuery> places; // alternates between clusters and instances
+  for (uint32_t n = 0; n < 5000; ++n) {
+    const auto instance = n / 3 * 7 % static_cast<uint32_t>(source.instances().size());
+    const uint32_t triangles = source.counts(source.instances()[instance].geometry).triangles;
+    places.push_back({instance, n * 37 % triangles, Vec2(0.2f, 0.01f * static_cast<float>(n % 60))});
+  }
+  std::vector<SurfaceAttributes> found(places.size());
+  std::vector<TriangleAttributes> triangles(places.size());
+  source.look_up(places, found);
+  ASSERT_TRUE(source.look_up_triangles(places, triangles));
+  for (size_t i = 0; i < places.size(); ++i) {
+    const std::array<Vec3, 3>& corners = triangles[i].normals;
+    ASSERT_EQ(triangles[i].material, found[i].material) << i;
+    const Vec3 n =
+        interpolated_normal(corners[0], corners[1], corners[2], places[i].barycentrics.x, places[i].barycentrics.y);
+    ASSERT_EQ(glm::length(n) > 0.0f, found[i].has_normal) << i;
+    if (!found[i].has_normal) continue;
+    ASSERT_EQ(n / glm::length(n), found[i].normal) << i;
+  }
+}
+
+TEST(PackedSource, FloatsDoNotInterpolateNormalsOfTriangles) {
+  const Scene scene = cubes_scene();
+  const FloatSource floats(scene);
+  std::vector<TriangleAttributes> out(1);
+  EXPECT_FALSE(floats.look_up_triangles(std::vector<SurfaceQuery>(1), out));
+}
+
 TEST(PackedSource, RendersTheImageOfTheFloats) {
   const Scene scene = cubes_scene();
   const BakedFile file = bake(scene);
