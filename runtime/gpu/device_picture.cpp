@@ -10,31 +10,35 @@
 // The functions of DeviceRays for whole pictures.
 namespace packtrace::gpu {
 
-std::shared_ptr<DeviceView> DeviceRays::trace_view(const ViewRecord& view, std::span<const double> film,
-                                                   uint32_t ray_class, std::shared_ptr<DeviceView> reused,
-                                                   const Watch& watch) {
+/// Writes the camera that kernels read.
+void DeviceRays::State::write_view(Commands& commands, const View& from) {
+  if (view.bytes() == 0) view = StagedBuffer(device, sizeof from.record, "the camera");
+  const std::span<const std::byte> film_bytes = std::as_bytes(std::span(from.film));
+  if (film.bytes() < film_bytes.size()) film = StagedBuffer(device, film_bytes.size(), "the camera's film");
+  view.write(commands, push_bytes(from.record));
+  film.write(commands, film_bytes);
+}
+
+std::shared_ptr<DeviceView> DeviceRays::trace_view(const View& view, uint32_t ray_class,
+                                                   std::shared_ptr<DeviceView> reused, const Watch& watch) {
   State& s = *state_;
   s.follow_scene();
-  require_few_pixels(view.width, view.height);
-  const size_t pixels = size_t{view.width} * view.height;
+  const uint32_t width = view.record.width, height = view.record.height;
+  require_few_pixels(width, height);
+  const size_t pixels = size_t{width} * height;
   if (!reused || reused.use_count() > 1 || reused->pixels() != pixels || reused->device() != s.device) {
     reused.reset();
     reused = std::make_shared<DeviceView>(s.device, pixels);
   }
   reused->set_surfaces(false);
-  if (s.view.bytes() == 0) s.view = StagedBuffer(s.device, sizeof view, "the camera");
-  if (s.film.bytes() < film.size_bytes()) s.film = StagedBuffer(s.device, film.size_bytes(), "the camera's film");
   Commands commands;
-  s.view.write(commands, push_bytes(view));
-  s.film.write(commands, std::as_bytes(film));
+  s.write_view(commands, view);
   s.device->run(commands);
   if (!s.view_kernel)
     s.view_kernel =
         s.scene.make_ray_kernel({spirv::view(), spirv::view_rays()}, kFirstRayBinding + 3, sizeof(SpanRecord));
-  const StagedBuffer& hits = reused->hits_buffer();
-  const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &hits.device()};
-  s.run_pixels(*s.view_kernel, buffers, view.width, view.height, ray_class, false, watch);
-  s.view_size = {view.width, view.height};
+  const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &reused->hits_buffer().device()};
+  s.run_pixels(*s.view_kernel, buffers, width, height, ray_class, false, watch);
   return reused;
 }
 
@@ -52,25 +56,26 @@ void DeviceRays::set_surfaces(std::span<const InstanceSurface> instances, std::s
 
 uint64_t DeviceRays::surface_bytes() const { return state_->instances.bytes() + state_->lookup.bytes(); }
 
-void DeviceRays::make_surfaces(DeviceView& picture, const SurfaceViewRecord& view) {
+void DeviceRays::make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces) {
   State& s = *state_;
   s.follow_scene();
   const StagedBuffer& planes = picture.planes();
-  if (s.surface_view.bytes() == 0) s.surface_view = StagedBuffer(s.device, sizeof view, "cameras of surfaces");
+  if (s.surface_view.bytes() == 0) s.surface_view = StagedBuffer(s.device, sizeof surfaces, "cameras of surfaces");
   if (!s.surfaces_kernel)
     s.surfaces_kernel = s.scene.make_kernel(spirv::surfaces(), kFirstRayBinding + 7, sizeof(SpanRecord));
+  Commands commands;
+  s.write_view(commands, view);
+  s.surface_view.write(commands, push_bytes(surfaces));
   const Buffer* const buffers[] = {&s.view.device(), &s.film.device(), &picture.hits_buffer().device(), &s.instances,
                                    &s.lookup,        &planes.device(), &s.surface_view.device()};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.surfaces_kernel->bind(kFirstRayBinding + i, *buffers[i]);
-  Commands commands;
-  s.surface_view.write(commands, push_bytes(view));
-  const uint64_t threads = block_threads(s.view_size.width, s.view_size.height);
+  const uint64_t threads = block_threads(view.record.width, view.record.height);
   for (uint64_t first = 0; first < threads; first += s.most_threads()) {
     const uint64_t count = std::min(threads - first, s.most_threads());
     const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), 0, 0};
     commands.dispatch(*s.surfaces_kernel, push_bytes(span), groups_of(count), 1);
   }
-  const uint64_t words = view.moved != 0 ? kPositionPlane : kMotionPlane;
+  const uint64_t words = surfaces.moved != 0 ? kPositionPlane : kMotionPlane;
   commands.copy(planes.device(), planes.host(), words * sizeof(uint32_t) * picture.pixels());
   s.device->run(commands);
   picture.set_surfaces(true);

@@ -39,20 +39,25 @@ public:
   /// Makes a point of each pixel that was hit, lifted off its surface by a length of unit space.
   void make_points(float lift);
 
+  /// The camera of a picture.
+  struct View {
+    ViewRecord record;
+    std::vector<double> film; ///< PrimaryCamera::film_x() of all columns, then film_y() of all rows
+  };
   /// Traces the rays of all pixels of a camera.
-  /// @param film PrimaryCamera::film_x() of all columns, then film_y() of all rows
   /// @param reused a picture whose memory may be used, or null
-  std::shared_ptr<DeviceView> trace_view(const ViewRecord& view, std::span<const double> film, uint32_t ray_class,
-                                         std::shared_ptr<DeviceView> reused, const Watch& watch);
+  std::shared_ptr<DeviceView> trace_view(const View& view, uint32_t ray_class, std::shared_ptr<DeviceView> reused,
+                                         const Watch& watch);
   /// Reads the hits of a picture back.
   void read_hits(const DeviceView& picture) const;
 
   /// Uploads what surfaces need of the scene's instances and clusters.
   /// @param lookup instance of each placement, then the words of a NormalRecord for each cluster
   void set_surfaces(std::span<const InstanceSurface> instances, std::span<const uint32_t> lookup);
-  /// Makes the planes of the last picture that trace_view() traced, and reads those before the points' back. Without
-  /// view.moved, motion and previous depths are not read back either. Needs set_surfaces(). Throws as Buffer does.
-  void make_surfaces(DeviceView& picture, const SurfaceViewRecord& view);
+  /// Makes the planes of a picture that trace_view() traced, and reads those before the points' back. Without
+  /// surfaces.moved, motion and previous depths are not read back either. Needs set_surfaces(). Throws as Buffer does.
+  /// @param view the picture's
+  void make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces);
   /// Reads the planes of the points back.
   void read_points(const DeviceView& picture) const;
   /// Device memory of set_surfaces().

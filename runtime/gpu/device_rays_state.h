@@ -62,9 +62,6 @@ struct DeviceRays::State {
   StagedBuffer points, view, film;
   Buffer instances, lookup;  ///< of surfaces: InstanceSurface; words of instances and NormalRecord
   StagedBuffer surface_view; ///< SurfaceViewRecord
-  struct {
-    uint32_t width = 0, height = 0;
-  } view_size; ///< of the last trace_view()
   uint32_t point_count = 0;
   std::unique_ptr<Kernel> camera_kernel, view_kernel, surfaces_kernel, points_kernel, rays_kernel, nearest_kernel;
   std::unique_ptr<Kernel> walk_kernel, queue_kernel; ///< of count_occluded()
@@ -96,6 +93,7 @@ struct DeviceRays::State {
     }
     return true;
   }
+  void write_view(Commands& commands, const View& from);
   uint64_t most_threads() const {
     return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * Kernel::kGroupThreads;
   }

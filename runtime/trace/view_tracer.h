@@ -97,8 +97,9 @@ public:
                                                         const Progress& progress) const = 0;
   /// The hits of such a picture, one per pixel. Valid until its memory is used again.
   virtual std::span<const RayHit> hits(const gpu::DeviceView& picture) const = 0;
-  /// Makes the surfaces that the rays of the last such picture hit: the bits of trace_primary(). Returns nothing if
+  /// Makes the surfaces that the rays of such a picture hit: the bits of trace_primary(). Returns nothing if
   /// there is no memory for them, or the scene's scale is so extreme that the device may round differently.
+  /// @param now the picture's camera
   /// @param previous not an environment camera; motion is that of surfaces at rest since this camera
   /// @param no_motion_px kNoMotionPx
   virtual std::optional<SurfacePlanes> make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,

@@ -37,17 +37,22 @@ gpu::OcclusionRecord occlusion_record(const OcclusionSamples& samples, uint32_t 
   return record;
 }
 
-gpu::ViewRecord view_record(const PrimaryCamera& camera, const UnitSpace& space) {
+gpu::DeviceRays::View view_of(const PrimaryCamera& camera, const UnitSpace& space) {
   const DAffine& place = camera.world_from_camera();
-  gpu::ViewRecord record{};
+  const ImageSize size = camera.size();
+  gpu::DeviceRays::View view{};
+  gpu::ViewRecord& record = view.record;
   for (int axis = 0; axis < 3; ++axis) {
     for (int column = 0; column < 3; ++column) record.linear[3 * column + axis] = place[column][axis];
     record.eye[axis] = place[3][axis], record.centre[axis] = space.centre()[axis];
   }
   record.scale = space.scale(), record.near_ = UnitSpace::kNear;
-  record.width = camera.size().width, record.height = camera.size().height;
+  record.width = size.width, record.height = size.height;
   record.orthographic = camera.projection() == Projection::kOrthographic ? 1 : 0;
-  return record;
+  view.film.reserve(size_t{size.width} + size.height);
+  for (uint32_t x = 0; x < size.width; ++x) view.film.push_back(camera.film_x(x));
+  for (uint32_t y = 0; y < size.height; ++y) view.film.push_back(camera.film_y(y));
+  return view;
 }
 
 } // namespace
@@ -126,14 +131,10 @@ std::shared_ptr<gpu::DeviceView> GpuTracer::trace_camera(const PrimaryCamera& ca
                                                          std::shared_ptr<gpu::DeviceView> reused,
                                                          const Progress& progress) const {
   if (camera.projection() == Projection::kEnvironment) return nullptr;
-  const ImageSize size = camera.size();
-  std::vector<double> film(size_t{size.width} + size.height);
-  for (uint32_t x = 0; x < size.width; ++x) film[x] = camera.film_x(x);
-  for (uint32_t y = 0; y < size.height; ++y) film[size.width + y] = camera.film_y(y);
   const std::lock_guard lock(device_rays_mutex_);
   begin_picture();
   try {
-    return device_rays_->trace_view(view_record(camera, space()), film, ray_class, std::move(reused),
+    return device_rays_->trace_view(view_of(camera, space()), ray_class, std::move(reused),
                                     [&](double) { progress.check_cancelled(); });
   } catch (const Error& error) { // spans of rays need less memory, and smaller buffers
     if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
@@ -159,7 +160,7 @@ std::optional<SurfacePlanes> GpuTracer::make_surfaces(gpu::DeviceView& picture, 
       const SurfaceTables tables = surface_tables(file_, source_, packed_);
       device_rays_->set_surfaces(tables.instances, tables.lookup);
     }
-    device_rays_->make_surfaces(picture, record);
+    device_rays_->make_surfaces(picture, view_of(now, space()), record);
   } catch (const Error& error) {
     surfaces_uploaded_ = false;
     if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
