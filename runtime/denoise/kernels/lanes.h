@@ -84,14 +84,20 @@ inline void store_first(int count, T* to, typename LanesOf<T>::Type v) {
     std::memcpy(to, &v, static_cast<size_t>(count) * sizeof(T));
 }
 
-template <size_t... kLane>
-constexpr I32 numbers(std::index_sequence<kLane...>) {
-  return I32{static_cast<int32_t>(kLane)...};
+/// Lanes kFirst, kFirst + 2, ... of two vectors that follow each other.
+template <int kFirst, int... kLane>
+inline F32 every_second(F32 a, F32 b, std::integer_sequence<int, kLane...>) {
+  return __builtin_shufflevector(a, b, kFirst + 2 * kLane...);
 }
-constexpr I32 kEachLane = numbers(std::make_index_sequence<kFloats>()); ///< 0, 1, 2 ...
-/// Every second lane of two vectors.
-inline F32 even_lanes(F32 a, F32 b) { return __builtin_shuffle(a, b, 2 * kEachLane); }
-inline F32 odd_lanes(F32 a, F32 b) { return __builtin_shuffle(a, b, 2 * kEachLane + 1); }
+using EachLane = std::make_integer_sequence<int, kFloats>;
+inline F32 even_lanes(F32 a, F32 b) { return every_second<0>(a, b, EachLane()); }
+inline F32 odd_lanes(F32 a, F32 b) { return every_second<1>(a, b, EachLane()); }
+
+template <int... kLane>
+constexpr I32 numbers(std::integer_sequence<int, kLane...>) {
+  return I32{kLane...};
+}
+constexpr I32 kEachLane = numbers(EachLane()); ///< 0, 1, 2 ...
 
 inline I32 both(I32 a, I32 b) { return a & b; }
 inline F32 select(I32 condition, F32 a, F32 b) { return condition ? a : b; }
