@@ -11,6 +11,7 @@
 #include "runtime/trace/gpu/gpu_tracer.h"
 #include "runtime/trace/source/lod_source.h"
 #include "tests/runtime/gpu/gpu_test_device.h"
+#include "tests/runtime/gpu/same_surfaces.h"
 #include "tests/runtime/trace/packed_scenes.h"
 
 namespace packtrace {
@@ -33,14 +34,7 @@ protected:
     trace_primary(source, tracer.packed(), camera, before, expected, progress);
     trace_primary(source, tracer, camera, before, gbuffer, progress);
     EXPECT_TRUE(gbuffer.on_gpu && gbuffer.on_gpu->has_surfaces());
-    EXPECT_EQ(gbuffer.view_z, expected.view_z);
-    EXPECT_EQ(gbuffer.position, expected.position);
-    EXPECT_EQ(gbuffer.geometric_normal, expected.geometric_normal);
-    EXPECT_EQ(gbuffer.normal, expected.normal);
-    EXPECT_EQ(gbuffer.instance, expected.instance);
-    EXPECT_EQ(gbuffer.offset, expected.offset);
-    EXPECT_EQ(gbuffer.motion_px, expected.motion_px);
-    EXPECT_EQ(gbuffer.previous_z, expected.previous_z);
+    test::expect_same_surfaces(gbuffer, expected);
     for (const std::string& message : tracer.scene().validation_messages()) ADD_FAILURE() << message;
     return expected;
   }

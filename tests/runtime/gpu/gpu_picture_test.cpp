@@ -8,6 +8,7 @@
 #include "runtime/gpu/device_view.h"
 #include "runtime/trace/gpu/gpu_tracer.h"
 #include "tests/runtime/gpu/gpu_test_device.h"
+#include "tests/runtime/gpu/same_surfaces.h"
 #include "tests/runtime/trace/packed_scenes.h"
 
 namespace packtrace {
@@ -32,18 +33,11 @@ protected:
     Progress progress;
     trace_primary(baked_.source, tracer.packed(), now, before, expected, progress);
     trace_primary(baked_.source, tracer, now, before, gbuffer, progress);
-    EXPECT_EQ(gbuffer.view_z, expected.view_z);
-    EXPECT_EQ(gbuffer.position, expected.position);
-    EXPECT_EQ(gbuffer.geometric_normal, expected.geometric_normal);
-    EXPECT_EQ(gbuffer.normal, expected.normal);
+    test::expect_same_surfaces(gbuffer, expected);
     EXPECT_EQ(gbuffer.albedo, expected.albedo);
-    EXPECT_EQ(gbuffer.instance, expected.instance);
     EXPECT_EQ(gbuffer.triangle, expected.triangle);
     EXPECT_EQ(gbuffer.material, expected.material);
     EXPECT_EQ(gbuffer.back_face, expected.back_face);
-    EXPECT_EQ(gbuffer.offset, expected.offset);
-    EXPECT_EQ(gbuffer.motion_px, expected.motion_px);
-    EXPECT_EQ(gbuffer.previous_z, expected.previous_z);
     EXPECT_GT(std::ranges::count_if(expected.view_z, [](float z) { return z > 0.0f; }), 100);
     expect_same_device_surfaces(tracer, now, before, expected);
     for (const std::string& message : tracer.scene().validation_messages()) ADD_FAILURE() << message;
@@ -57,14 +51,7 @@ protected:
     gbuffer.keep_channels(0);
     Progress progress;
     trace_primary(baked_.source, tracer, now, before, gbuffer, progress);
-    EXPECT_EQ(gbuffer.view_z, expected.view_z);
-    EXPECT_EQ(gbuffer.position, expected.position);
-    EXPECT_EQ(gbuffer.geometric_normal, expected.geometric_normal);
-    EXPECT_EQ(gbuffer.normal, expected.normal);
-    EXPECT_EQ(gbuffer.instance, expected.instance);
-    EXPECT_EQ(gbuffer.offset, expected.offset);
-    EXPECT_EQ(gbuffer.motion_px, expected.motion_px);
-    EXPECT_EQ(gbuffer.previous_z, expected.previous_z);
+    test::expect_same_surfaces(gbuffer, expected);
     EXPECT_EQ(gbuffer.on_gpu && gbuffer.on_gpu->has_surfaces(), now.projection() != Projection::kEnvironment);
   }
 
