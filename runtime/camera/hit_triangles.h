@@ -20,7 +20,7 @@ public:
     uint8_t& found = found_[(hit.triangle + hit.part * 41u + hit.placement * 13u) % kMaxColumnRays];
     if (found < count_ && is_on(hit, found)) return found;
     hits_[count_] = hit;
-    return found = static_cast<uint8_t>(count_++); // a triangle whose place another one took gets a second number
+    return found = static_cast<uint8_t>(count_++); // after a hash collision, a triangle may get a second number
   }
 
   /// Decodes all triangles.
@@ -53,10 +53,10 @@ private:
 };
 static_assert(kMaxColumnRays <= 256);
 
-/// Divides rays into runs whose placements are alike.
+/// Divides rays into runs of equivalent placements, which share one vectorised loop.
 class PlacementRuns {
 public:
-  /// @param alike whether two placements are
+  /// @param alike whether two placements are equivalent
   template <typename Alike>
   void sort(const HitTriangles& triangles, const Alike& alike) {
     count_ = 0;

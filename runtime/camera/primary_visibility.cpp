@@ -31,8 +31,8 @@ struct RayBatch {
   Ray rays[kBatch];    ///< block by block
   RayHit hits[kBatch]; ///< of the rays
   HitTriangles triangles;
-  PlacementRuns surfaces; ///< in the columns: placements that move surfaces alike
-  PlacementRuns normals;  ///< placements that turn normals alike
+  PlacementRuns surfaces; ///< by column element: placements with equal transforms of surfaces
+  PlacementRuns normals;  ///< placements with equal transforms of normals
 
   /// Calls work(element of the columns, number of its ray) for all pixels.
   template <typename Work>

@@ -51,7 +51,7 @@ public:
   /// Reads the hits of a picture back.
   void read_hits(const DeviceView& picture) const;
 
-  /// Uploads what surfaces need of the scene's instances and clusters.
+  /// Uploads the tables of instances and clusters that make_surfaces() reads.
   /// @param lookup instance of each placement, then the words of a NormalRecord for each cluster
   void set_surfaces(std::span<const InstanceSurface> instances, std::span<const uint32_t> lookup);
   /// Makes the planes of a picture that trace_view() traced, and reads those before the points' back. Without

@@ -9,7 +9,7 @@
 
 namespace packtrace::gpu {
 
-/// What the camera rays of a picture hit, on a device and mapped: hits, and planes of a G-buffer made of them.
+/// The hits of a picture's camera rays, and G-buffer planes made from them, on a device and mapped.
 class DeviceView {
 public:
   /// Throws as Buffer does.

@@ -85,7 +85,7 @@ inline F32 excess(F32 change, F32 limit) {
   return select(change < 0.0f, -left, left);
 }
 
-/// The windows around some pixels.
+/// Statistics of the windows around the pixels of a vector.
 struct Windows {
   F32 count, narrow_count; ///< at least 1
   F32 change, narrow_change;
@@ -104,7 +104,7 @@ struct Windows {
   }
 
   /// Whether correction() might not be 0: its test, multiplied by count (count - 1), without divisions and roots. The
-  /// least variance and the factor 1.001 allow for their roundings.
+  /// least variance and the factors 0.999 allow for their roundings.
   bool may_change(const CorrectTerms& t) const {
     const F32 least = greater(count * squares * (1.0f - 4e-6f) - sum * sum, F32{});
     const F32 noise = (t.gamma * t.gamma * t.fast_share * 0.999f) * least, others = greater(count - 1.0f, all(1.0f));
@@ -115,7 +115,7 @@ struct Windows {
            any_greater(squared(narrow) * others * count, noise * narrow_count);
   }
 
-  /// By how much the mean is wrong beyond the error of the noise.
+  /// The part of the change that noise does not explain, which is added to the mean.
   F32 correction(const CorrectTerms& t) const {
     const F32 spread = squares - sum * (sum / count);
     const F32 variance = select(count > 1.0f, greater(spread, F32{}) / greater(count - 1.0f, all(1.0f)), F32{});

@@ -34,7 +34,7 @@ using I32 __attribute__((vector_size(4 * kFloats))) = int32_t;
 inline U16 all(uint16_t value) { return U16{} + value; }
 inline F32 all(float value) { return F32{} + value; }
 
-/// The vector of the lanes that an element of memory fills.
+/// The vector type whose lanes have a given element type.
 template <typename T>
 struct LanesOf;
 template <>

@@ -100,7 +100,7 @@ inline WantedSurfaces one_of(const WantedRow& w, int x) {
           I32{} + static_cast<uint16_t>(w.normal_z[x]), I32{} + static_cast<int32_t>(w.instance[x])};
 }
 
-/// Where the previous frame shows the same surface, and has a history.
+/// Returns a mask of the lanes whose previous pixel shows the same surface and has a history.
 /// @param ignored bits in which instances may differ
 inline I32 shows(const PreviousPixels& p, ptrdiff_t at, const WantedSurfaces& w, int32_t ignored) {
   const F32 there = load(p.disparity + at);

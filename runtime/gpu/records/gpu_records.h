@@ -107,7 +107,7 @@ struct NormalRecord {
 };
 inline constexpr uint32_t kHasNormals = 1u << 31;
 
-/// What surfaces need of a picture's cameras besides the ViewRecord.
+/// Cameras of a picture, besides its ViewRecord, for making its surfaces.
 struct SurfaceViewRecord {
   double inverse_scale;                    ///< of the unit space
   double depth[4], depth_scale;            ///< third row of camera_from_world, and world units per camera unit
@@ -118,7 +118,7 @@ struct SurfaceViewRecord {
   uint32_t before_orthographic;            ///< 1, or 0: perspective
 };
 
-/// Planes of a G-buffer by the number of words per pixel before them; named as GBuffer's arrays.
+/// First words of the planes of a G-buffer, in units of the number of pixels; named as GBuffer's arrays.
 inline constexpr uint32_t kViewZPlane = 0, kNormalPlane = 1, kInstancePlane = 4, kMotionPlane = 5, kPreviousZPlane = 7,
                           kPositionPlane = 8, kGeometricPlane = 11, kOffsetPlane = 14, kPlaneWords = 15;
 

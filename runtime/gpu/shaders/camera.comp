@@ -3,6 +3,7 @@
 // Makes camera rays and finds their nearest hits.
 #define CLOSEST
 #include "trace.glsl"
+#include "blocks.glsl"
 
 layout(std430, binding = 9) readonly restrict buffer Cameras { CameraRecord camera; };
 layout(std430, binding = 10) writeonly restrict buffer Hits { HitRecord hits[]; };
@@ -13,10 +14,8 @@ void main() {
   uint i = THREAD;
   if (i >= span.count) return;
   i += span.first;
-  // Blocks of 8 x 4 pixels; those at the right and lower edge are not full.
-  uint block = i >> 5, in_block = i & 31u, per_row = (camera.width + 7u) / 8u;
-  uvec2 p = uvec2((block % per_row) * 8u + (in_block & 7u), (block / per_row) * 4u + (in_block >> 3));
-  if (p.x >= camera.width || p.y >= camera.height) return;
+  uvec2 p;
+  if (!pixel_of_thread(i, camera.width, camera.height, p)) return;
   precise dvec3 d = dvec3(camera.corner[0], camera.corner[1], camera.corner[2]) +
                     dvec3(camera.right[0], camera.right[1], camera.right[2]) * double(p.x) +
                     dvec3(camera.down[0], camera.down[1], camera.down[2]) * double(p.y);

@@ -1,8 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Makes the points from which occlusion rays start, of the planes that surfaces.comp wrote: lift_origins(), the same
-// bits. Points lie in blocks of 8 x 4 pixels.
+// Makes the points from which occlusion rays start from the planes that surfaces.comp wrote, with the bits of
+// lift_origins(). Threads without a surface write kNoPoint.
 #include "records.glsl"
+#include "blocks.glsl"
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly restrict buffer Planes { uint planes[]; };
@@ -18,10 +19,10 @@ void main() {
   uint i = gl_GlobalInvocationID.x;
   if (i >= push.count) return;
   i += push.first;
-  uint block = i >> 5, in_block = i & 31u, per_row = (push.width + 7u) / 8u;
-  uvec2 p = uvec2((block % per_row) * 8u + (in_block & 7u), (block / per_row) * 4u + (in_block >> 3));
+  uvec2 p;
+  bool inside = pixel_of_thread(i, push.width, push.height, p);
   uint n = push.width * push.height, pixel = p.y * push.width + p.x;
-  if (p.x >= push.width || p.y >= push.height || planes[kInstancePlane * n + pixel] == kNoInstance ||
+  if (!inside || planes[kInstancePlane * n + pixel] == kNoInstance ||
       (push.colour < 2u && ((p.x + p.y) & 1u) != push.colour)) {
     float[3] zero = float[3](0.0, 0.0, 0.0);
     points[i] = PointRecord(zero, zero, zero, kNoPoint, p.x, p.y);

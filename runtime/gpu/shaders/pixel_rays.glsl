@@ -1,4 +1,5 @@
 // Rays of a picture's pixels, with the bits of PrimaryCamera::linear_ray() and approach_scene().
+#include "blocks.glsl"
 
 layout(std430, binding = 9) readonly restrict buffer Views { ViewRecord view; };
 layout(std430, binding = 10) readonly restrict buffer Film { double film[]; }; // x of columns, then y of rows
@@ -31,13 +32,6 @@ bool approach_scene(inout dvec3 origin, dvec3 direction) {
   precise dvec3 moved = point - back;
   origin = moved;
   return true;
-}
-
-// The pixel of a thread. Threads take blocks of 8 x 4 pixels, and those outside the picture get false.
-bool pixel_of_thread(uint thread, out uvec2 p) {
-  uint block = thread >> 5, in_block = thread & 31u, per_row = (view.width + 7u) / 8u;
-  p = uvec2((block % per_row) * 8u + (in_block & 7u), (block / per_row) * 4u + (in_block >> 3));
-  return p.x < view.width && p.y < view.height;
 }
 
 // Makes the ray of a pixel in unit space. Returns false if it misses the scene.

@@ -3,6 +3,7 @@
 // Makes the points from which occlusion rays start, of camera rays' hits: in blocks of 8 x 4 pixels, with the geometric
 // normal. For benchmarks; pictures take theirs from the G-buffer.
 #include "scene.glsl"
+#include "blocks.glsl"
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 9) readonly restrict buffer Cameras { CameraRecord camera; };
@@ -44,9 +45,8 @@ void main() {
   uint i = gl_GlobalInvocationID.x;
   if (i >= span.count) return;
   i += span.first;
-  uint block = i >> 5, in_block = i & 31u, per_row = (camera.width + 7u) / 8u;
-  uvec2 p = uvec2((block % per_row) * 8u + (in_block & 7u), (block / per_row) * 4u + (in_block >> 3));
-  if (p.x < camera.width && p.y < camera.height) {
+  uvec2 p;
+  if (pixel_of_thread(i, camera.width, camera.height, p)) {
     points[i] = make_point(p.y * camera.width + p.x, p);
   } else {
     float[3] zero = float[3](0.0, 0.0, 0.0);

@@ -9,17 +9,15 @@
 layout(local_size_x = 64) in;
 layout(std430, binding = 11) readonly restrict buffer Hits { HitRecord hits[]; };
 layout(std430, binding = 12) readonly restrict buffer Instances { InstanceSurface instances[]; };
-layout(std430, binding = 14) writeonly restrict buffer Planes { uint planes[]; }; // SurfacePlane
+layout(std430, binding = 14) writeonly restrict buffer Planes { uint planes[]; }; // kViewZPlane and others
 layout(std430, binding = 15) readonly restrict buffer SurfaceViews { SurfaceViewRecord surface_view; };
-
-const double kHalfSize = 1048576.0lf; // of the unit space
 
 dmat3 linear_part(uint instance) {
   dmat3 m;
   [[unroll]] for (int i = 0; i < 9; ++i) m[i / 3][i % 3] = instances[instance].unit_from_surface[i];
   return m;
 }
-// m v, summed in the CPU's order.
+// The product m v, summed in the CPU's order.
 dvec3 times(dmat3 m, dvec3 v) {
   precise dvec3 x = m[0] * v.x, y = m[1] * v.y, z = m[2] * v.z;
   precise dvec3 sum = (x + y) + z;
@@ -29,7 +27,7 @@ dvec3 crossed(dvec3 a, dvec3 b) {
   precise dvec3 m = a.yzx * b.zxy, n = b.yzx * a.zxy, difference = m - n;
   return difference;
 }
-// The map of normals: normal_matrix().
+// The matrix that transforms normals: the cofactor matrix, as normal_matrix() on the CPU.
 dmat3 normal_matrix(dmat3 m) {
   dmat3 cofactor = dmat3(crossed(m[1], m[2]), crossed(m[2], m[0]), crossed(m[0], m[1]));
   return product(m[0], cofactor[0]) < 0.0lf ? -cofactor : cofactor;
@@ -47,7 +45,7 @@ dvec3 facing_normal(dvec3 normal, dvec3 direction) {
 
 // Where the ray meets the surface's plane, if that is close to the point of the barycentrics; else that point.
 dvec3 on_ray(dvec3 origin, dvec3 direction, dvec3 from_barycentrics, dvec3 normal) {
-  const double kMinCosine = 1e-3lf, kMaxMove = kHalfSize / 1048576.0lf;
+  const double kMinCosine = 1e-3lf, kMaxMove = 1.0lf; // 2^-20 of the unit space's half size
   double cosine = product(normal, direction);
   precise dvec3 way = from_barycentrics - origin;
   double t = refined_quotient(product(normal, way), cosine);
@@ -57,7 +55,7 @@ dvec3 on_ray(dvec3 origin, dvec3 direction, dvec3 from_barycentrics, dvec3 norma
   return cosine < -kMinCosine && product(move, move) <= kMaxMove * kMaxMove ? point : from_barycentrics;
 }
 
-// How far above the surface rays start, in world units: ray_offset().
+// The offset of ray origins along the normal, in world units: ray_offset().
 double lift(dvec3 position, dvec3 normal, dvec3 world, dmat3 unit_from_surface, dvec3 largest_vertex) {
   const double kEpsilon = 1.0lf / 8388608.0lf, kUlps = 4.0lf;
   dvec3 moved;
@@ -84,7 +82,7 @@ vec3 shading_normal(uint instance, bool has_normal, vec3 object_normal, dvec3 ge
   return vec3(unit);
 }
 
-// Motion in pixels and depth before of a point at rest: move_with_camera().
+// The motion vector in pixels, and the depth in the previous frame, of a point at rest: move_with_camera().
 vec3 motion_of(uvec2 p, dvec3 world) {
   dvec3 c = dvec3(0.0lf);
   [[unroll]] for (int i = 0; i < 3; ++i) {
@@ -176,7 +174,7 @@ void main() {
   uint i = gl_GlobalInvocationID.x;
   if (i >= span.count) return;
   uvec2 p;
-  if (!pixel_of_thread(i + span.first, p)) return;
+  if (!pixel_of_thread(i + span.first, view.width, view.height, p)) return;
   uint pixel = p.y * view.width + p.x;
   HitRecord h = hits[pixel];
   if (h.placement == 0xffffffffu)

@@ -11,7 +11,7 @@ void main() {
   uint i = THREAD;
   if (i >= span.count) return;
   uvec2 p;
-  if (!pixel_of_thread(i + span.first, p)) return;
+  if (!pixel_of_thread(i + span.first, view.width, view.height, p)) return;
   float infinity = uintBitsToFloat(0x7f800000u);
   Best best = Best(0.0, 0.0, 0xffffffffu, 0u, 0u);
   float t = infinity;

@@ -88,7 +88,7 @@ private:
   TakenStructures structures_;                 ///< of the cache
   mutable uint64_t structures_generation_ = 0; ///< of the cache, when the structures were placed
   std::unique_ptr<gpu::DeviceRays> device_rays_;
-  mutable bool surfaces_uploaded_ = false; ///< the tables of device_rays_->make_surfaces(), as instances are placed
+  mutable bool surfaces_uploaded_ = false; ///< whether the tables of DeviceRays::set_surfaces() are up to date
   mutable std::mutex device_rays_mutex_;
   std::string device_; ///< its name, and how it makes floats
 };

@@ -76,7 +76,7 @@ TEST_F(DeviceSurfacesTest, NormalsOfAllFamilies) {
   scene.instances.push_back({0, Affine(placed({1, 2, 0}, {-1.5, 1, 2}, 35))});
   scene.instances.push_back({0, Affine(placed({4, 2, 1}, DVec3(2), 80, {1, 1, 0}))});
   bool palette = false, mixed = false, unfolded = false;
-  // Pipelines are made for each file, which takes longest: one encoding per kind, and the narrowest.
+  // Each file needs its own pipelines, whose compilation takes longest, so not all encodings are tested.
   for (const NormalEncoding encoding :
        {NormalEncoding::kZsign32, NormalEncoding::kAxis24, NormalEncoding::kOct24, NormalEncoding::kAxis12}) {
     SCOPED_TRACE(format_of(encoding).name);
