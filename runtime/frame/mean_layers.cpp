@@ -141,11 +141,23 @@ std::span<const Vec3> MeanLayers::albedos(const GBuffer& last, std::vector<Vec3>
   return memory;
 }
 
+/// Writes ambient occlusion and coverage of a single frame without sub-pixels.
+void MeanLayers::resolve_occlusion(const GBuffer& frame, std::span<const float> ao, RenderedImage& image) const {
+  for_each_image_row(image.size.height, [&](uint32_t y) {
+    for (size_t i = size_t{y} * image.size.width, end = i + image.size.width; i < end; ++i) {
+      const bool hit = frame.instance[i] != kNoInstance;
+      image.coverage[i] = hit ? 1.0f : 0.0f;
+      image.ao[i] = hit && ao[i] >= 0.0f ? ao[i] : kInvalidAo;
+    }
+  });
+}
+
 void MeanLayers::resolve(const FrameConfig& config, const GBuffer& last, std::span<const float> ao,
                          std::span<const float> raw, RenderedImage& image) const {
   const uint32_t factor = config.supersample, layers = config.plain_layers;
   image.size = config.size;
   clear_plain_layers(layers, image);
+  if (factor == 1 && layers == 0 && frames_ == 1 && !kept()) return resolve_occlusion(last, ao, image);
   const float rays = static_cast<float>(frames_) * static_cast<float>(factor * factor);
   const auto resolve_pixel = [&](uint32_t x, uint32_t y) {
     const size_t out = static_cast<size_t>(y) * image.size.width + x;

@@ -52,6 +52,7 @@ private:
   };
   void clear_sums(ImageSize size);
   bool kept() const { return frames_ > 1 || kept_; }
+  void resolve_occlusion(const GBuffer& frame, std::span<const float> ao, RenderedImage& image) const;
   Sums sums_of(const GBuffer& gbuffer, size_t pixel) const;
   Sums sums(const GBuffer& last, size_t pixel) const;
 

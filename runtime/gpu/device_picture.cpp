@@ -123,8 +123,8 @@ void DeviceRays::write_picture(DeviceAo& picture, uint32_t sample_count, bool ne
   if (!s.picture_kernel)
     s.picture_kernel = std::make_unique<Kernel>(s.device, spirv::occlusion_image(), std::span<const uint32_t>(), 4,
                                                 static_cast<uint32_t>(sizeof(OcclusionImageRecord)));
-  const Buffer &counts = nearest ? s.sums : s.counts, &sums = nearest ? s.sums : s.counts; // one of them is read
-  const Buffer* const buffers[] = {&s.points.device(), &counts, &sums, &picture.values()};
+  const Buffer& results = nearest ? s.nearest.results : s.any.results; // for both bindings, of which one is read
+  const Buffer* const buffers[] = {&s.points.device(), &results, &results, &picture.values()};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.picture_kernel->bind(i, *buffers[i]);
   const OcclusionImageRecord record{
       1.0 / sample_count, radius, s.point_count, sample_count, static_cast<uint32_t>(picture.pixels()),

@@ -79,121 +79,110 @@ void DeviceRays::set_points(std::span<const PointRecord> points) {
 
 void DeviceRays::release() {
   state_->points = StagedBuffer();
-  for (Buffer* buffer : {&state_->counts, &state_->spare_counts, &state_->sums}) *buffer = Buffer();
+  for (Occlusion* occlusion : {&state_->any, &state_->nearest})
+    occlusion->results = Buffer(), occlusion->spare = Buffer();
 }
 
-/// Whether the queue kernel can count occluded rays: subgroups of 4 to 32 lanes, at most 2^24 nodes, no masks.
+/// Whether the queue kernels can run: subgroups of 4 to 32 lanes, at most 2^24 nodes, no masks.
 bool DeviceRays::State::has_queue() const {
   const uint32_t lanes = device->traits().subgroup_size;
   return !scene.structures && !scene.masked && lanes >= kMinLanes && lanes <= kMaxLanes &&
          scene.node_count <= kMaxQueueNodes;
 }
 
-void DeviceRays::State::make_count_kernels() {
-  const auto make = [&](std::span<const uint32_t> compute) {
-    return scene.make_ray_kernel({compute, spirv::occlusion_count_rays()}, kFirstRayBinding + 2,
-                                 sizeof(OcclusionRecord));
-  };
-  if (!walk_kernel) walk_kernel = make(spirv::occlusion_count());
-  if (!queue_kernel && has_queue())
-    queue_kernel = make(device->traits().partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue());
-  for (Kernel* kernel : {walk_kernel.get(), queue_kernel.get()}) {
+void DeviceRays::State::make_kernels(Occlusion& occlusion, const RayKernelCode& walk, std::span<const uint32_t> queue) {
+  constexpr uint32_t kBindings = kFirstRayBinding + 2, kPushBytes = sizeof(OcclusionRecord);
+  if (!occlusion.walk) occlusion.walk = scene.make_ray_kernel(walk, kBindings, kPushBytes);
+  if (!occlusion.queue && has_queue()) occlusion.queue = scene.make_kernel(queue, kBindings, kPushBytes);
+  for (Kernel* kernel : {occlusion.walk.get(), occlusion.queue.get()}) {
     if (kernel == nullptr) continue;
     kernel->bind(kFirstRayBinding, points.device());
-    kernel->bind(kFirstRayBinding + 1, counts);
+    kernel->bind(kFirstRayBinding + 1, occlusion.results);
   }
 }
 
-/// Runs kernels for all points, and for at most `most_samples` of their samples at a time.
-/// @param run function of push constants and a number of groups that returns ms
-/// @param threads function of a number of samples: threads of a point
-template <typename Run, typename Threads>
-DeviceTime DeviceRays::State::run_all(const Run& run, const OcclusionRecord& samples, uint32_t most_samples, Pace& pace,
-                                      const Threads& threads, const Watch& watch) {
+/// Traces the rays of all points, with the kernel that is faster.
+/// @param max_samples of a point in a dispatch
+/// @param split_samples whether several threads, with samples.per_thread samples each, may share a point
+DeviceTime DeviceRays::State::trace(Occlusion& occlusion, OcclusionRecord samples, uint32_t max_samples,
+                                    bool split_samples, const Watch& watch) {
+  device->fill(occlusion.results, 0);
+  FasterKernel& faster = occlusion.faster[samples.order];
+  Kernel* const kernels[] = {occlusion.walk.get(), occlusion.queue.get()};
+  double spare_ms = 0.0; // of dispatches that only compare kernels
+  const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
+    const uint64_t rays = uint64_t{part.point_count} * part.sample_count;
+    const GpuOcclusion wanted = device->config().occlusion;
+    if (kernels[1] == nullptr || wanted != GpuOcclusion::kFaster) {
+      Kernel* const asked = kernels[1] == nullptr || wanted == GpuOcclusion::kWalk ? kernels[0] : kernels[1];
+      return device->run(*asked, push_bytes(part), groups);
+    }
+    const bool compares = faster.compares(rays) && make_spare(occlusion);
+    const size_t number = faster.choice(rays);
+    std::array<double, 2> ms{};
+    ms[number] = device->run(*kernels[number], push_bytes(part), groups);
+    if (!compares) return ms[number];
+    Kernel& other = *kernels[1 - number];
+    other.bind(kFirstRayBinding + 1, occlusion.spare);
+    ms[1 - number] = device->run(other, push_bytes(part), groups);
+    other.bind(kFirstRayBinding + 1, occlusion.results);
+    faster.add(rays, ms);
+    spare_ms += ms[1 - number];
+    return ms[number];
+  };
   DeviceTime time;
-  for (uint32_t done = 0; done < samples.sample_count;) {
-    OcclusionRecord part = samples;
-    part.first_sample = samples.first_sample + done;
-    part.sample_count = std::min(samples.sample_count - done, most_samples);
-    const uint32_t per_point = threads(part.sample_count);
+  const uint32_t sample_count = samples.sample_count, first_sample = samples.first_sample;
+  for (uint32_t done = 0; done < sample_count; done += samples.sample_count) {
+    samples.first_sample = first_sample + done;
+    samples.sample_count = std::min(sample_count - done, max_samples);
+    if (!split_samples) samples.per_thread = samples.sample_count;
+    const uint32_t threads = (samples.sample_count + samples.per_thread - 1) / samples.per_thread; // of a point
     const Watch watch_part = [&](double share) {
-      if (watch) watch((done + share * part.sample_count) / samples.sample_count);
+      if (watch) watch((done + share * samples.sample_count) / sample_count);
     };
-    TimedDispatches dispatches(*device, pace, part.sample_count, most_threads() / per_point / 2, watch_part);
+    TimedDispatches dispatches(*device, occlusion.pace[samples.order], samples.sample_count,
+                               most_threads() / threads / 2, watch_part);
     const DeviceTime of_part = dispatches.all(point_count, 2 * kThreads, [&](uint64_t first, uint64_t count) {
-      part.first_point = static_cast<uint32_t>(first), part.point_count = static_cast<uint32_t>(count);
-      return run(part, groups_of((count + 31) / 32 * 32 * per_point));
+      samples.first_point = static_cast<uint32_t>(first), samples.point_count = static_cast<uint32_t>(count);
+      return run(samples, groups_of((count + 31) / 32 * 32 * threads));
     });
     time.ms += of_part.ms, time.dispatches += of_part.dispatches;
     time.longest_ms = std::max(time.longest_ms, of_part.longest_ms);
-    done += part.sample_count;
   }
+  time.ms += spare_ms;
+  uint32_t lost = 0; // the last word of the buffer, which is not of a point
+  download(device, occlusion.results, occlusion.results.bytes() - sizeof lost,
+           std::as_writable_bytes(std::span(&lost, 1)));
+  if (lost != 0)
+    throw Error(ErrorKind::kUnsupported,
+                "backend gpu: " + device->name() + " ended a kernel before all rays were traced; use --backend packed");
   return time;
 }
 
 DeviceTime DeviceRays::count_occluded(const OcclusionRecord& samples, const Watch& watch) {
   State& s = *state_;
   s.follow_scene();
-  s.make_room(s.counts, (uint64_t{s.point_count} + 1) * sizeof(uint32_t), "counts");
-  s.device->fill(s.counts, 0);
-  s.make_count_kernels();
-  FasterKernel& faster = s.faster[samples.order];
-  Kernel* const kernels[] = {s.walk_kernel.get(), s.queue_kernel.get()};
-  double spare_ms = 0.0; // of dispatches that only compare kernels
-  const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
-    const uint64_t rays = uint64_t{part.point_count} * part.sample_count;
-    const GpuCounting counting = s.device->config().counting;
-    if (kernels[1] == nullptr || counting != GpuCounting::kFaster) {
-      Kernel* const asked = kernels[1] == nullptr || counting == GpuCounting::kWalk ? kernels[0] : kernels[1];
-      return s.device->run(*asked, push_bytes(part), groups);
-    }
-    const bool compares = faster.compares(rays) && s.make_spare_counts();
-    const size_t number = faster.choice(rays);
-    std::array<double, 2> ms{};
-    ms[number] = s.device->run(*kernels[number], push_bytes(part), groups);
-    if (!compares) return ms[number];
-    Kernel& other = *kernels[1 - number];
-    other.bind(kFirstRayBinding + 1, s.spare_counts);
-    ms[1 - number] = s.device->run(other, push_bytes(part), groups);
-    other.bind(kFirstRayBinding + 1, s.counts);
-    faster.add(rays, ms);
-    spare_ms += ms[1 - number];
-    return ms[number];
-  };
-  const auto threads = [&](uint32_t count) { return (count + samples.per_thread - 1) / samples.per_thread; };
-  DeviceTime time = s.run_all(run, samples, kMaxSamples, s.count_pace[samples.order], threads, watch);
-  time.ms += spare_ms;
-  uint32_t lost = 0;
-  download(s.device, s.counts, s.counts.bytes() - sizeof lost, std::as_writable_bytes(std::span(&lost, 1)));
-  if (lost != 0)
-    throw Error(ErrorKind::kUnsupported, "backend gpu: " + s.device->name() +
-                                             " ended a kernel before all rays were traced; use --backend packed");
-  return time;
+  s.make_room(s.any.results, (uint64_t{s.point_count} + 1) * sizeof(uint32_t), "counts");
+  s.make_kernels(s.any, {spirv::occlusion_count(), spirv::occlusion_count_rays()},
+                 s.device->traits().partitioned ? spirv::occlusion_queue_partitioned() : spirv::occlusion_queue());
+  return s.trace(s.any, samples, kMaxSamples, true, watch);
 }
 
 DeviceTime DeviceRays::sum_nearest(const OcclusionRecord& samples, const Watch& watch) {
   State& s = *state_;
   s.follow_scene();
-  s.make_room(s.sums, uint64_t{s.point_count} * 2 * sizeof(double), "sums");
-  s.device->fill(s.sums, 0);
-  if (!s.nearest_kernel)
-    s.nearest_kernel = s.scene.make_ray_kernel({spirv::occlusion_nearest(), spirv::occlusion_nearest_rays()},
-                                               kFirstRayBinding + 2, sizeof(OcclusionRecord));
-  s.nearest_kernel->bind(kFirstRayBinding, s.points.device());
-  s.nearest_kernel->bind(kFirstRayBinding + 1, s.sums);
-  const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
-    return s.device->run(*s.nearest_kernel, push_bytes(part), groups);
-  };
-  return s.run_all(run, samples, kMaxNearestSamples, s.nearest_pace[samples.order], [](uint32_t) { return 1u; }, watch);
+  s.make_room(s.nearest.results, (uint64_t{s.point_count} * 2 + 1) * sizeof(double), "sums");
+  s.make_kernels(s.nearest, {spirv::occlusion_nearest(), spirv::occlusion_nearest_rays()},
+                 s.device->traits().partitioned ? spirv::nearest_queue_partitioned() : spirv::nearest_queue());
+  return s.trace(s.nearest, samples, kMaxNearestSamples, false, watch);
 }
 
 std::map<std::string, std::vector<std::pair<std::string, double>>> DeviceRays::kernel_statistics() const {
   std::map<std::string, std::vector<std::pair<std::string, double>>> all;
-  const std::pair<const char*, const Kernel*> kernels[] = {{"camera", state_->camera_kernel.get()},
-                                                           {"view", state_->view_kernel.get()},
-                                                           {"count occluded, walk", state_->walk_kernel.get()},
-                                                           {"count occluded, queue", state_->queue_kernel.get()},
-                                                           {"sum nearest", state_->nearest_kernel.get()}};
+  const std::pair<const char*, const Kernel*> kernels[] = {
+      {"camera", state_->camera_kernel.get()},           {"view", state_->view_kernel.get()},
+      {"count occluded, walk", state_->any.walk.get()},  {"count occluded, queue", state_->any.queue.get()},
+      {"sum nearest, walk", state_->nearest.walk.get()}, {"sum nearest, queue", state_->nearest.queue.get()}};
   for (const auto& [name, kernel] : kernels)
     if (kernel != nullptr) all[name] = kernel->statistics();
   return all;
@@ -211,11 +200,11 @@ void DeviceRays::points(std::span<PointRecord> out) const {
   download(state_->device, state_->points.device(), 0, std::as_writable_bytes(out));
 }
 void DeviceRays::counts(std::span<uint32_t> out) const {
-  download(state_->device, state_->counts, 0, std::as_writable_bytes(out));
+  download(state_->device, state_->any.results, 0, std::as_writable_bytes(out));
 }
 
 void DeviceRays::sums(std::span<double> out) const {
-  download(state_->device, state_->sums, 0, std::as_writable_bytes(out));
+  download(state_->device, state_->nearest.results, 0, std::as_writable_bytes(out));
 }
 
 void DeviceRays::occlusion_rays(const OcclusionRecord& samples, std::span<packed::KernelRay> out) {

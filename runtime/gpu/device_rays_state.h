@@ -50,6 +50,15 @@ void with_slack(uint64_t bytes, const Allocate& allocate) {
   }
 }
 
+/// Two kernels with the same results that trace the occlusion rays of all points, and their results.
+struct Occlusion {
+  std::unique_ptr<Kernel> walk, queue; ///< queue: null where it cannot run
+  Buffer results;                      ///< by point; at the end a word that is not 0 if some ray was not traced
+  Buffer spare;                        ///< results of dispatches that only compare the kernels
+  FasterKernel faster[kSampleOrders];  ///< by the order of samples
+  Pace pace[kSampleOrders];
+};
+
 /// What a DeviceRays has on its device.
 struct DeviceRays::State {
   explicit State(GpuScene::State& on_device) : scene(on_device), device(on_device.device) {}
@@ -57,20 +66,17 @@ struct DeviceRays::State {
   GpuScene::State& scene;
   std::shared_ptr<Device> device;
   CameraRecord camera{};
-  Buffer cameras, hits, rays, counts, sums;
-  Buffer spare_counts; ///< of dispatches that only compare kernels
+  Buffer cameras, hits, rays;
   StagedBuffer points, view, film;
   Buffer instances, lookup;  ///< of surfaces: InstanceSurface; words of instances and NormalRecord
   StagedBuffer surface_view; ///< SurfaceViewRecord
   uint32_t point_count = 0;
-  std::unique_ptr<Kernel> camera_kernel, view_kernel, surfaces_kernel, points_kernel, rays_kernel, nearest_kernel;
-  std::unique_ptr<Kernel> walk_kernel, queue_kernel; ///< of count_occluded()
+  std::unique_ptr<Kernel> camera_kernel, view_kernel, surfaces_kernel, points_kernel, rays_kernel;
   std::unique_ptr<Kernel> picture_kernel, picture_points_kernel;
-  uint64_t placed = 0;                ///< GpuScene::State::placed of the kernels
-  std::vector<uint32_t> constants;    ///< GpuScene::State::constants of the kernels
-  FasterKernel faster[kSampleOrders]; ///< of count_occluded(), by the order of samples
-  Pace camera_pace, count_pace[kSampleOrders],
-      nearest_pace[kSampleOrders]; ///< of occlusion rays by the order of samples
+  Occlusion any, nearest;          ///< of count_occluded() and sum_nearest()
+  uint64_t placed = 0;             ///< GpuScene::State::placed of the kernels
+  std::vector<uint32_t> constants; ///< GpuScene::State::constants of the kernels
+  Pace camera_pace;
 
   void make_room(Buffer& buffer, uint64_t bytes, const char* what) {
     if (buffer.bytes() >= bytes) return;
@@ -83,10 +89,10 @@ struct DeviceRays::State {
     points = StagedBuffer();
     with_slack(bytes, [&](uint64_t all) { points = StagedBuffer(device, all, "points"); });
   }
-  /// Allocates spare_counts. Returns false if device memory does not suffice.
-  bool make_spare_counts() {
+  /// Allocates Occlusion::spare. Returns false if device memory does not suffice.
+  bool make_spare(Occlusion& occlusion) {
     try {
-      make_room(spare_counts, counts.bytes(), "counts");
+      make_room(occlusion.spare, occlusion.results.bytes(), "results");
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
       return false;
@@ -98,10 +104,10 @@ struct DeviceRays::State {
     return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * Kernel::kGroupThreads;
   }
   bool has_queue() const;
-  void make_count_kernels();
-  template <typename Run, typename Threads>
-  DeviceTime run_all(const Run& run, const OcclusionRecord& samples, uint32_t most_samples, Pace& pace,
-                     const Threads& threads, const Watch& watch);
+  /// @param walk, queue code of the kernels, which are made unless they are there
+  void make_kernels(Occlusion& occlusion, const RayKernelCode& walk, std::span<const uint32_t> queue);
+  DeviceTime trace(Occlusion& occlusion, OcclusionRecord samples, uint32_t max_samples, bool split_samples,
+                   const Watch& watch);
   /// Runs a kernel that traces a ray through each pixel, in blocks of 8 x 4 pixels.
   DeviceTime run_pixels(Kernel& kernel, std::span<const Buffer* const> buffers, uint32_t width, uint32_t height,
                         uint32_t ray_class, bool keep_rays, const Watch& watch) {
@@ -116,8 +122,8 @@ struct DeviceRays::State {
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
     const bool same = std::exchange(constants, scene.constants) == scene.constants;
-    for (auto* kernel : {&camera_kernel, &view_kernel, &surfaces_kernel, &points_kernel, &rays_kernel, &walk_kernel,
-                         &queue_kernel, &nearest_kernel})
+    for (auto* kernel : {&camera_kernel, &view_kernel, &surfaces_kernel, &points_kernel, &rays_kernel, &any.walk,
+                         &any.queue, &nearest.walk, &nearest.queue})
       if (same && *kernel)
         scene.bind_scene(**kernel);
       else

@@ -17,10 +17,10 @@ enum class GpuStructures : uint8_t {
   kDriver, ///< acceleration structures of the Vulkan driver over decoded triangles
 };
 
-/// Which kernel counts occluded rays of packed nodes; their counts are the same.
-enum class GpuCounting : uint8_t {
+/// Which kernel traces occlusion rays through packed nodes; results are the same.
+enum class GpuOcclusion : uint8_t {
   kFaster, ///< the one that took less time of late
-  kWalk,   ///< occlusion_count.comp
+  kWalk,   ///< occlusion_count.comp and occlusion_nearest.comp
   kQueue,  ///< occlusion_queue.comp, where it can run
 };
 
@@ -32,7 +32,7 @@ struct GpuConfig {
   uint64_t memory_limit_bytes = 0; ///< device memory that may be allocated; 0: as much as the device has
   GpuArithmetic arithmetic = GpuArithmetic::kProbed;
   GpuStructures structures = GpuStructures::kPacked;
-  GpuCounting counting = GpuCounting::kFaster;
+  GpuOcclusion occlusion = GpuOcclusion::kFaster;
   double dispatch_ms = 50.0;             ///< time that a dispatch should take at most; work is split accordingly
   bool statistics = false;               ///< kernels know what the compiler says of them, where the driver tells
   bool validation = false;               ///< Vulkan's validation layer, where it is installed

@@ -40,7 +40,7 @@ struct Options {
   uint32_t camera = 0;
   double radius = 0.1; ///< of the occlusion rays, in diagonals of the world
   GpuConfig gpu;
-  bool exact = false;
+  bool exact = false, only_walk = false;
   bool only_frames = false;
   bool structures = false;
 };
@@ -129,6 +129,8 @@ public:
       for (const uint32_t spp : options_.spp) out["occlusion"].push_back(run_occlusion(order, key, spp));
       out["equality"].push_back(compare_occlusion(order, key));
     }
+    for (const uint32_t spp : {1u, 16u}) out["nearest"].push_back(run_nearest(spp));
+    out["equality"].push_back(compare_nearest());
     for (const auto& [kernel, values] : rays_.kernel_statistics())
       for (const auto& [name, value] : values) out["kernels"][kernel][name] = value;
     return out;
@@ -212,6 +214,7 @@ private:
     record.idle_lanes = order == gpu::kDirectionOrder ? lanes : std::max(lanes / 4, 1u);
     const Bounds world = source_.world_bounds();
     record.tfar = static_cast<float>(options_.radius * glm::length(world.hi - world.lo) * tracer_.space().scale());
+    record.inverse_radius = 1.0f / record.tfar, record.parabola = 1.0f, record.end = 1.0f, record.darkening = 1.0f;
     return record;
   }
 
@@ -237,6 +240,36 @@ private:
             {"counts_hash", hash},
             {"dispatches", time.dispatches},
             {"longest_dispatch_ms", time.longest_ms}};
+  }
+
+  /// Nearest hits with the order of samples of pictures.
+  Json run_nearest(uint32_t spp) {
+    const gpu::OcclusionRecord record = occlusion_record(gpu::kNetOrder, 0, spp);
+    std::vector<double> ms;
+    warm_up([&] { rays_.sum_nearest(record); });
+    for (uint32_t i = 0; i < options_.repeats; ++i) ms.push_back(rays_.sum_nearest(record).ms);
+    return {{"spp", spp}, {"ms", median(ms)}, {"mrays_s", double(points_hit_) * spp / median(ms) * 1e-3}};
+  }
+
+  /// Compares the nearest hits of a sample of all points with packed's.
+  Json compare_nearest() {
+    const gpu::OcclusionRecord record = occlusion_record(gpu::kNetOrder, 5, 1);
+    std::vector<packed::KernelRay> from(rays_.point_count());
+    std::vector<double> sums(2 * from.size());
+    rays_.sum_nearest(record);
+    rays_.sums(sums);
+    rays_.occlusion_rays(record, from);
+    const std::vector<RayHit> expected = traced<RayHit>(as_rays(from), [&](auto in, auto out) {
+      tracer_.packed().closest_hits(in, kOcclusionRays, RayOrder::kIncoherent, out);
+    });
+    uint64_t rays = 0, other = 0;
+    for (size_t i = 0; i < from.size(); ++i) {
+      if (!(from[i].tfar > 0.0f)) continue;
+      const float way = expected[i].valid() ? std::min(expected[i].t * record.inverse_radius, 1.0f) : 1.0f;
+      ++rays, other += sums[2 * i + 1] == double{way} ? 0 : 1;
+    }
+    different_ += other;
+    return {{"order", "net, nearest"}, {"rays", rays}, {"different", other}};
   }
 
   /// Compares the counts of single samples of all points with packed's any hits, and their sum with the counts.
@@ -276,6 +309,7 @@ private:
 int run(Options& options) {
   options.gpu.statistics = true;
   if (options.structures) options.gpu.structures = GpuStructures::kDriver;
+  if (options.only_walk) options.gpu.occlusion = GpuOcclusion::kWalk;
   if (options.exact) options.gpu.arithmetic = GpuArithmetic::kExact;
   uint64_t different = 0;
   bool same_frames = true;
@@ -308,6 +342,7 @@ int main(int argc, char** argv) {
   command_line.add("--dispatch-ms", options.gpu.dispatch_ms, "time that a dispatch should take").show_default();
   command_line.flag("--only-frames", options.only_frames, "measure frames and the denoiser only");
   command_line.flag("--structures", options.structures, "trace with the driver's acceleration structures");
+  command_line.flag("--only-walk", options.only_walk, "occlusion rays by kernels whose threads walk alone");
   command_line.flag("--exact", options.exact, "make floats from doubles, whatever the device can");
   if (const auto code = command_line.parse(argc, argv)) return *code;
   try {

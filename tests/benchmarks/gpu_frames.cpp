@@ -132,40 +132,37 @@ Json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const
   FrameLoop packed(scene, config);
   const Bounds world = source.world_bounds();
   const double step = 2e-4 * glm::length(world.hi - world.lo);
-  constexpr uint32_t kWarm = 3, kCompared = 4;
+  constexpr uint32_t kCompared = 4;
   Times moving, still;
   Progress progress;
   RenderedImage image, expected;
+  PictureReport picture;
   Differences of_moving, of_still;
-  for (uint32_t f = 0; f < kWarm + repeats; ++f) {
-    const Camera view = moved(camera, step * f);
-    PictureReport picture, of_packed;
+  const auto next = [&](FrameLoop& frames, const Camera& view, RenderedImage& out) {
+    picture = {};
+    const FrameReport report = frames.next_frame(view, 0.0, progress);
+    frames.resolve(out, picture);
+    return report;
+  };
+  const auto compare = [&](const Camera& view, Differences& differences) {
+    next(loop, view, image);
+    const uint64_t hits = next(packed, view, expected).hit_pixels;
+    differences.add(image.ao, expected.ao, hits);
+  };
+  for (uint32_t f = 0; f < kCompared; ++f) compare(moved(camera, step * f), of_moving);
+  loop.reset(), packed.reset(); // so that still frames begin anew in both
+  for (uint32_t f = 0; f < kCompared; ++f) compare(camera, of_still);
+  // The device's clock is low until it was busy for a while, as it is beside a window.
+  uint32_t f = 0;
+  for (const Stopwatch warming; f < 3 || warming.seconds() < 1.0; ++f) next(loop, moved(camera, step * f), image);
+  const auto measure = [&](const Camera& view, Times& times) {
     const Stopwatch watch;
-    const FrameReport report = loop.next_frame(view, 0.0, progress);
-    loop.resolve(image, picture);
-    if (f >= kWarm) moving.add(loop, report, picture, watch.seconds());
-    if (f >= kCompared) continue;
-    const uint64_t hits = packed.next_frame(view, 0.0, progress).hit_pixels;
-    packed.resolve(expected, of_packed);
-    of_moving.add(image.ao, expected.ao, hits);
-  }
-  const Camera last = moved(camera, step * (kWarm + repeats - 1));
-  for (uint32_t f = 0; f < kWarm + repeats; ++f) {
-    PictureReport picture;
-    const Stopwatch watch;
-    const FrameReport report = loop.next_frame(last, 0.0, progress);
-    loop.resolve(image, picture);
-    if (f >= kWarm) still.add(loop, report, picture, watch.seconds());
-  }
-  // Backend packed got fewer frames, so both begin anew.
-  loop.reset(), packed.reset();
-  for (uint32_t f = 0; f < kCompared; ++f) {
-    PictureReport picture, of_packed;
-    loop.next_frame(last, 0.0, progress);
-    const uint64_t hits = packed.next_frame(last, 0.0, progress).hit_pixels;
-    loop.resolve(image, picture), packed.resolve(expected, of_packed);
-    of_still.add(image.ao, expected.ao, hits);
-  }
+    const FrameReport report = next(loop, view, image);
+    times.add(loop, report, picture, watch.seconds());
+  };
+  for (const uint32_t end = f + repeats; f < end; ++f) measure(moved(camera, step * f), moving);
+  const Camera last = moved(camera, step * (f - 1));
+  for (uint32_t i = 0; i < repeats; ++i) measure(last, still);
   CopyFloor floor(device);
   Json out{{"moving", moving.json(floor, size.pixels())}, {"still", still.json(floor, size.pixels())}};
   out["moving"]["difference"] = of_moving.json(), out["still"]["difference"] = of_still.json();

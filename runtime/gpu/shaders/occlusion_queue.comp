@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Counts the occlusion rays that hit something, for each point. Rays are made here.
+// CLOSEST: sums the visibility and the distance of the nearest hits up instead, as occlusion_nearest.comp does.
 //
 // A thread walks a ray's nodes and puts the leaves it reaches into its subgroup's queue. Once that is long enough, or no
 // ray goes on, the subgroup's lanes set up a leaf each, then decode a corner each, then test a pair of ray and triangle
@@ -19,17 +20,26 @@
 #include "traversal.glsl"
 #include "points.glsl"
 #include "leaves.glsl"
+#ifdef CLOSEST
+#include "visibility.glsl"
+#else
+layout(std430, binding = 10) buffer Counts { uint counts[]; }; // the last word: 1 if some ray was not traced
+#endif
 
 const uint kGroup = 64u, kPlaces = 2u; // threads; places of the queue per lane
 // Decoded corners per lane. A leaf has up to 48: lanes times this must be at least that.
 layout(constant_id = 9) const uint kCorners = 8u;
 
 layout(local_size_x = 64) in;
-layout(std430, binding = 10) buffer Counts { uint counts[]; }; // the last word: 1 if some ray was not traced
 
 shared uint s_queue[kGroup * kPlaces];     // node << 8 | lane << 3 | slot
 shared uint s_corner[kGroup * kCorners * 3]; // floats; before there are any: which lane has a leaf
-shared uint s_hit[kGroup / 4u];            // by subgroup: bits of the rays that hit something
+#ifdef CLOSEST
+shared uint s_nearest[kGroup]; // by thread: ordered() t of the nearest hit that the last tests found
+const uint kNoHit = 0xffffffffu;
+#else
+shared uint s_hit[kGroup / 4u]; // by subgroup: bits of the rays that hit something
+#endif
 
 #define S gl_SubgroupSize
 #define LANE gl_SubgroupInvocationID
@@ -62,6 +72,28 @@ Corner shared_corner(GridRay p, uint at) { // at: of the first float
   return make_corner(p, vec3(uintBitsToFloat(s_corner[at + kx]), uintBitsToFloat(s_corner[at + ky]),
                              uintBitsToFloat(s_corner[at + kz])));
 }
+
+#ifdef CLOSEST
+// Floats as words in the same order.
+uint ordered(float t) {
+  uint bits = floatBitsToUint(t);
+  return bits ^ ((bits & 0x80000000u) != 0u ? 0xffffffffu : 0x80000000u);
+}
+float from_ordered(uint word) {
+  return uintBitsToFloat(word ^ ((word & 0x80000000u) != 0u ? 0x80000000u : 0xffffffffu));
+}
+
+// Ends the ray at the nearest hit of the last tests, if that is nearer than all before. Returns whether it is.
+bool take_nearest(uint word, inout UnitRay u, Way way, inout GridRay r) {
+  if (word == kNoHit) return false;
+  precise double unit = (double(from_ordered(word)) + r.t_begin) * r.t_scale; // grows with t
+  float unit_t = float(unit);
+  if (unit_t > u.tmax) return false;
+  u.tmax = unit_t;
+  shorten(u, way, r);
+  return true;
+}
+#endif
 
 // Tests up to S leaves of the queue from e0 on.
 void flush_leaves(GridRay r, uint tree_flags, uint e0, uint total) {
@@ -131,7 +163,11 @@ void flush_leaves(GridRay r, uint tree_flags, uint e0, uint total) {
         TriangleHit hit;
         if (test_triangle(p, shared_corner(p, corner0 + 3u * q.x), shared_corner(p, corner0 + 3u * q.y),
                           shared_corner(p, corner0 + 3u * q.z), flags, hit))
+#ifdef CLOSEST
+          atomicMin(s_nearest[thread0 + lane], ordered(hit.t));
+#else
           atomicOr(s_hit[gl_SubgroupID], 1u << lane);
+#endif
       }
     }
     sync_shared();
@@ -150,14 +186,19 @@ void main() {
   valid = valid && points[valid ? number : 0u].pixel != kNoPoint;
   uint s = push.first_sample + slice * push.per_thread;
   uint end = push.first_sample + min((slice + 1u) * push.per_thread, push.sample_count);
+#ifdef CLOSEST
+  bool struck = false; // the ray has a hit
+  s_nearest[gl_SubgroupID * S + LANE] = kNoHit;
+#else
   uint occluded = 0u;
+  if (LANE == 0u) s_hit[gl_SubgroupID] = 0u;
+#endif
   // pending: some leaf of the ray is in the queue. held: leaves of a node for which the queue had no room.
   bool alive = valid && s < end, tracing = false, pending = false;
   uint count = 0u, held = 0u, held_node = 0u;
   UnitRay u;
   GridRay r;
   Way way;
-  if (LANE == 0u) s_hit[gl_SubgroupID] = 0u;
   sync_shared();
   for (uint guard = 0u; guard < 1000000u; ++guard) { // so that a mistake does not hang the device
     bool ended = false, hit = false, full = false;
@@ -167,8 +208,11 @@ void main() {
       if (alive && !tracing && !pending) {
         Point point = read_point(number); // again for each ray: it would take twelve registers all the way
         u = unit_ray(point.origin, sample_direction(point, s), 0.0, push.tfar);
-        tracing = begin_way(u, way, r);
+        tracing = push.tfar > 0.0 && begin_way(u, way, r);
         ended = !tracing;
+#ifdef CLOSEST
+        struck = false;
+#endif
       }
     }
     if (!subgroupAny(tracing || pending || ended)) break;
@@ -222,17 +266,27 @@ void main() {
       // Whole subgroups of leaves; the rest waits where rays go on.
       uint ending = subgroupAny(walking) && count >= S ? count - count % S : count;
       for (uint e = 0u; e < ending; e += S) flush_leaves(r, way.tree_flags, e, count);
-      uint found = s_hit[gl_SubgroupID], rest = count - ending, entry = 0u;
-      bool mine = (tracing || pending) && ((found >> LANE) & 1u) != 0u, stays = false;
-      hit = mine;
-      if (LANE < rest) {
-        entry = s_queue[queue0 + ending + LANE];
-        stays = ((found >> ((entry >> 3) & 31u)) & 1u) == 0u;
+      uint rest = count - ending, entry = 0u;
+      bool mine = false, stays = LANE < rest; // mine: the ray needs no more tests
+      if (stays) entry = s_queue[queue0 + ending + LANE];
+#ifdef CLOSEST
+      if (pending) {
+        uint nearest = s_nearest[gl_SubgroupID * S + LANE];
+        s_nearest[gl_SubgroupID * S + LANE] = kNoHit;
+        if (take_nearest(nearest, u, way, r)) struck = true;
       }
+#else
+      uint found = s_hit[gl_SubgroupID];
+      mine = (tracing || pending) && ((found >> LANE) & 1u) != 0u;
+      hit = mine;
+      stays = stays && ((found >> ((entry >> 3) & 31u)) & 1u) == 0u;
+#endif
       uint staying = subgroupBallot(stays).x, waiting = subgroupOr(stays ? 1u << ((entry >> 3) & 31u) : 0u);
       sync_shared();
       if (stays) s_queue[queue0 + through_lane(staying) - 1u] = entry;
+#ifndef CLOSEST
       if (LANE == 0u) s_hit[gl_SubgroupID] = 0u;
+#endif
       count = bitCount(staying);
       sync_shared();
       bool waits = ((waiting >> LANE) & 1u) != 0u;
@@ -244,12 +298,19 @@ void main() {
       pending = waits;
     }
     if (ended) {
+#ifdef CLOSEST
+      add_sample(number, struck, u.tmax);
+#else
       occluded += hit ? 1u : 0u;
+#endif
       ++s;
       alive = s < end;
     }
   }
+#ifdef CLOSEST
+  if (alive || tracing || pending) sums[sums.length() - 1] = 1.0lf;
+#else
   if (alive || tracing || pending) atomicMax(counts[counts.length() - 1], 1u);
-  if (!valid) return;
-  if (occluded != 0u) atomicAdd(counts[number], occluded);
+  if (valid && occluded != 0u) atomicAdd(counts[number], occluded);
+#endif
 }

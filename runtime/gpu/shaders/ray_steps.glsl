@@ -5,8 +5,13 @@
 const uint kNoPlacement = 0xffffffffu;
 const uint kRootParent = 0xffffffffu; // of the root of the tree over placements
 
-// With many placements: rays as triangle tests need them, by word, then by thread: origin, shear, begin, end, major.
+// With many placements: rays as triangle tests need them, by word, then by thread: origin, shear, begin, end, major, and
+// for nearest hits rest.
+#ifdef CLOSEST
+const uint kTestWords = kManyPlacements ? 12u * kGroup : 1u;
+#else
 const uint kTestWords = kManyPlacements ? 9u * kGroup : 1u;
+#endif
 shared uint s_test[kTestWords];
 // The ray in unit space, for box tests of the tree over placements: inverse, near_bias, far_bias, begin, end.
 const uint kTopWords = kManyPlacements ? 11u * kGroup : 1u;
@@ -22,6 +27,9 @@ void save_for_tests(GridRay r) {
   s_test[6u * kGroup + at] = floatBitsToUint(r.begin);
   s_test[7u * kGroup + at] = floatBitsToUint(r.end);
   s_test[8u * kGroup + at] = r.major;
+#ifdef CLOSEST
+  [[unroll]] for (uint i = 0u; i < 3u; ++i) s_test[(9u + i) * kGroup + at] = floatBitsToUint(r.rest[i]);
+#endif
 }
 // The ray of another lane in the grid of its placement; all lanes together.
 GridRay ray_for_tests(GridRay own, uint lane) {
@@ -36,12 +44,18 @@ GridRay ray_for_tests(GridRay own, uint lane) {
     r.begin = uintBitsToFloat(s_test[6u * kGroup + at]);
     r.end = uintBitsToFloat(s_test[7u * kGroup + at]);
     r.major = s_test[8u * kGroup + at];
+#ifdef CLOSEST
+    [[unroll]] for (uint i = 0u; i < 3u; ++i) r.rest[i] = uintBitsToFloat(s_test[(9u + i) * kGroup + at]);
+#endif
   } else {
     r.origin = subgroupShuffle(own.origin, lane);
     r.begin = kMayBeFar ? subgroupShuffle(own.begin, lane) : 0.0;
     r.end = subgroupShuffle(own.end, lane);
     r.shear = subgroupShuffle(own.shear, lane);
     r.major = subgroupShuffle(own.major, lane);
+#ifdef CLOSEST
+    r.rest = subgroupShuffle(own.rest, lane);
+#endif
   }
   return r;
 }
@@ -102,17 +116,41 @@ bool enter_placement(UnitRay u, uint placement, inout Way way, inout GridRay r) 
   return true;
 }
 
-// Prepares a ray in unit space for box tests of the tree over placements. Needs doubles only for far origins. Returns
+// Whether a ray starts so far from the tree over placements that entering it needs doubles.
+bool starts_far_from_all(UnitRay u) {
+  vec3 size = abs(u.origin);
+  return max(max(size.x, size.y), size.z) > kFar * scene.top_max_coordinate;
+}
+
+// Prepares a ray in unit space for box tests of the tree over placements. Returns
 // false if the ray misses the tree.
 bool enter_top(UnitRay u, inout GridRay r) {
-  vec3 size = abs(u.origin);
-  if (max(max(size.x, size.y), size.z) > kFar * scene.top_max_coordinate)
+  if (starts_far_from_all(u))
     return enter(u, scene.placement_count, scene.top_max_coordinate, scene.top_pad_coordinate, kMinTopDirection, r);
   r.begin = u.tnear;
   r.end = u.tmax;
   set_boxes(u.origin, u.direction, scene.top_pad_coordinate, kMinTopDirection, r);
   return true;
 }
+
+#ifdef CLOSEST
+// Shortens box tests of the ray to u.tmax, in the grid of the placement where its last hit lies and above.
+void shorten(UnitRay u, Way way, inout GridRay r) {
+  float end = grid_t(r, u.tmax);
+  if (!kManyPlacements) {
+    r.end = end;
+    return;
+  }
+  uint at = gl_SubgroupID * S + LANE;
+  s_test[7u * kGroup + at] = floatBitsToUint(end);
+  bool far = starts_far_from_all(u); // such rays keep their end above
+  if (!far) s_top[10u * kGroup + at] = u.tmax;
+  if (way.in_tree)
+    r.end = end;
+  else if (!far)
+    r.end = u.tmax;
+}
+#endif
 
 // Returns whether the ray may hit something.
 bool begin_way(UnitRay u, out Way way, inout GridRay r) {
@@ -149,6 +187,6 @@ uint step(GridRay r, inout Way way, out uint node) {
   if ((n.n1.z & 255u) != kInnerChild) return mask;
   if (way.group != 0u) stack[way.size++] = uvec2(way.first, way.group);
   way.first = top ? node : way.tree_first + n.n1.x;
-  way.group = mask;
+  way.group = group_of(mask, t);
   return 0u;
 }

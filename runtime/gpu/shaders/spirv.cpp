@@ -48,6 +48,12 @@ constexpr uint32_t kOcclusionQueue[] = {
 constexpr uint32_t kOcclusionQueuePartitioned[] = {
 #include <occlusion_queue_partitioned.inc>
 };
+constexpr uint32_t kNearestQueue[] = {
+#include <nearest_queue.inc>
+};
+constexpr uint32_t kNearestQueuePartitioned[] = {
+#include <nearest_queue_partitioned.inc>
+};
 constexpr uint32_t kDenoiseCompare[] = {
 #include <denoise_compare.inc>
 };
@@ -129,6 +135,8 @@ std::span<const uint32_t> occlusion_image() { return kOcclusionImage; }
 std::span<const uint32_t> occlusion_nearest() { return kOcclusionNearest; }
 std::span<const uint32_t> occlusion_queue() { return kOcclusionQueue; }
 std::span<const uint32_t> occlusion_queue_partitioned() { return kOcclusionQueuePartitioned; }
+std::span<const uint32_t> nearest_queue() { return kNearestQueue; }
+std::span<const uint32_t> nearest_queue_partitioned() { return kNearestQueuePartitioned; }
 std::span<const uint32_t> trace_any_rays() { return kTraceAnyRays; }
 std::span<const uint32_t> trace_closest_rays() { return kTraceClosestRays; }
 std::span<const uint32_t> camera_rays() { return kCameraRays; }

@@ -18,13 +18,15 @@ std::span<const uint32_t> picture_points();
 std::span<const uint32_t> surface_points();
 std::span<const uint32_t> occlusion_rays();
 std::span<const uint32_t> occlusion_image();
-std::span<const uint32_t> occlusion_nearest();
 /// A thread walks its rays alone.
+std::span<const uint32_t> occlusion_nearest();
 std::span<const uint32_t> occlusion_count();
 /// For scenes without masks.
 std::span<const uint32_t> occlusion_queue();
+std::span<const uint32_t> nearest_queue();
 /// For devices with DeviceTraits::partitioned.
 std::span<const uint32_t> occlusion_queue_partitioned();
+std::span<const uint32_t> nearest_queue_partitioned();
 
 /// Writes the triangles that acceleration structures are built from.
 std::span<const uint32_t> decode_triangles();

@@ -2,6 +2,7 @@
 
 #include "runtime/gpu/device_rays.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -59,6 +60,7 @@ protected:
     record.order = order, record.seed = 12345;
     record.idle_lanes = order == gpu::kRandomOrder ? 2 : 8;
     record.tfar = 3e5f;
+    record.inverse_radius = 1.0f / record.tfar, record.parabola = 1.0f, record.end = 1.0f, record.darkening = 1.0f;
     return record;
   }
 
@@ -88,10 +90,33 @@ protected:
     EXPECT_GT(occluded, 0u);
   }
 
+  /// Compares the distances of the nearest hits, summed by point, with those of the packed tracer.
+  static void expect_distances(const GpuTracer& tracer, gpu::DeviceRays& rays, const gpu::OcclusionRecord& all) {
+    std::vector<double> sums(2 * size_t{rays.point_count()}), distances, expected(rays.point_count());
+    rays.sum_nearest(all);
+    rays.sums(sums);
+    for (size_t i = 1; i < sums.size(); i += 2) distances.push_back(sums[i]);
+    std::vector<packed::KernelRay> made(rays.point_count());
+    size_t hit = 0;
+    for (uint32_t s = 0; s < all.sample_count; ++s) {
+      gpu::OcclusionRecord one = all;
+      one.first_sample = all.first_sample + s, one.sample_count = 1;
+      rays.occlusion_rays(one, made);
+      const std::vector<RayHit> hits = test::closest(tracer.packed(), as_rays(made), kOcclusionRays);
+      for (size_t i = 0; i < hits.size(); ++i) {
+        const bool point = made[i].tfar > 0.0f; // the device leaves pixels without a surface out
+        const float way = hits[i].valid() ? std::min(hits[i].t * all.inverse_radius, 1.0f) : 1.0f;
+        expected[i] += point ? double{way} : 0.0, hit += hits[i].valid() ? 1 : 0;
+      }
+    }
+    EXPECT_GT(hit, 0u);
+    EXPECT_EQ(distances, expected) << "order " << all.order << ", " << all.sample_count << " samples";
+  }
+
   void expect_same(const test::BakedScene& baked, uint32_t width, uint32_t height) {
-    for (const GpuCounting counting : {GpuCounting::kQueue, GpuCounting::kWalk}) {
+    for (const GpuOcclusion counting : {GpuOcclusion::kQueue, GpuOcclusion::kWalk}) {
       GpuConfig config = config_;
-      config.counting = counting;
+      config.occlusion = counting;
       expect_same(baked, config, width, height);
     }
   }
@@ -102,7 +127,8 @@ protected:
     EXPECT_GT(compare_camera(tracer, rays, camera_record(tracer.space(), width, height)), width * height / 10u);
     rays.make_points(1.0f);
     expect_counts(tracer, rays, samples(gpu::kRandomOrder, 0, 5, 2)); // three threads a point
-    if (config.counting == GpuCounting::kQueue) {
+    expect_distances(tracer, rays, samples(gpu::kNetOrder, 2, 3, 16));
+    if (config.occlusion == GpuOcclusion::kQueue) {
       expect_counts(tracer, rays, samples(gpu::kDirectionOrder, 3, 4, 4));
       expect_counts(tracer, rays, samples(gpu::kNetOrder, 7, 2, 16));
     }
