@@ -18,7 +18,7 @@ namespace {
 using Corners = std::array<DVec3, 3>;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-3; // steps; tolerance when triangles are clipped
-constexpr double kSlack = 1.25;    // stops once the largest error left is within this factor of largest_
+constexpr double kSlack = 1.25;    // errors within this factor of largest_ are good enough
 // At most max(kFew, 1 / kMeasuredFraction of all triangles) are measured: if more have large errors, tightening them
 // gains little.
 constexpr size_t kFew = 512, kMeasuredFraction = 8;
@@ -88,7 +88,7 @@ public:
   void run() {
     fill_heap();
     size_t left = std::max(kFew, (in_.triangles.size() + m_.triangles.size()) / kMeasuredFraction);
-    while (!heap_.empty() && heap_.front().first > kSlack * largest_ && left-- > 0 && !spent()) {
+    while (!heap_.empty() && heap_.front().first > limit() && left-- > 0 && !spent()) {
       std::pop_heap(heap_.begin(), heap_.end());
       const auto [stated, number] = heap_.back();
       heap_.pop_back();
@@ -96,12 +96,15 @@ public:
       const uint32_t t = is_before ? number : number - static_cast<uint32_t>(in_.triangles.size());
       double& bound = is_before ? links_.bounds[t] : m_.triangles[t].error;
       bound = std::min(stated, is_before ? measure_before(t, stated) : measure_after(t, stated));
-      largest_ = std::max(largest_, bound);
+      if (bound > limit()) largest_ = bound;
     }
     links_.links.insert(links_.links.end(), found_.begin(), found_.end());
   }
 
 private:
+  /// Errors up to here neither need a closer look nor raise largest_.
+  double limit() const { return kSlack * largest_; }
+
   /// Limits the work in soups: where every triangle is near all others, more measuring gains little.
   bool spent() const {
     const size_t triangles = std::max(kMinWorkTriangles, in_.triangles.size() + m_.triangles.size());
@@ -112,7 +115,7 @@ private:
     for (uint32_t t = 0; t < in_.triangles.size(); ++t) heap_.emplace_back(links_.bounds[t], t);
     for (uint32_t s = 0; s < m_.triangles.size(); ++s)
       heap_.emplace_back(m_.triangles[s].error, static_cast<uint32_t>(in_.triangles.size()) + s);
-    std::erase_if(heap_, [&](const auto& entry) { return entry.first <= kSlack * largest_; });
+    std::erase_if(heap_, [&](const auto& entry) { return entry.first <= limit(); });
     std::make_heap(heap_.begin(), heap_.end());
   }
 
@@ -175,7 +178,7 @@ private:
         if (spent()) return stated;
         const size_t source = worst_pieces_.size();
         const double bound = measure_below(t, near, below, depth, stated);
-        if (bound <= largest_) {
+        if (bound <= limit()) {
           largest = std::max(largest, bound);
           pieces_.insert(pieces_.end(), worst_pieces_.begin() + static_cast<std::ptrdiff_t>(source),
                          worst_pieces_.end());
@@ -197,7 +200,7 @@ private:
   /// Bounds the error of the part of lower-level triangle `below` that source triangle t stands for. Appends the
   /// simplified triangles that it was measured against to worst_pieces_.
   double measure_below(uint32_t t, const Neighbourhood& near, uint32_t below, uint32_t depth, double stated) {
-    const double error = in_.levels.errors[below], enough = (largest_ - error) / kErrorInflation;
+    const double error = in_.levels.errors[below], enough = (limit() - error) / kErrorInflation;
     const Corners corners = corners_of(below);
     if (const auto [s, distance] = nearest_to_all(below); distance <= enough) {
       worst_pieces_.push_back(s);
@@ -296,7 +299,7 @@ private:
 
   // ---- from the simplified surface to lower levels
 
-  /// Bounds the error of a simplified triangle. Goes back level by level while the bound exceeds largest_.
+  /// Bounds the error of a simplified triangle. Goes back level by level while the bound exceeds limit().
   double measure_after(uint32_t s, double stated) {
     if (linked_.ends.empty()) linked_ = links_.by_after(m_.triangles.size());
     const Corners corners = simplified_.corners(s);
@@ -305,13 +308,12 @@ private:
     numbers_.clear();
     for (uint32_t i = linked_.ends[s]; i < linked_.ends[s + 1]; ++i) numbers_.push_back(in_.numbers[linked_.source[i]]);
     double bound = stated;
-    for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > largest_ && !spent() && go_back(lo, hi);
-         ++depth)
+    for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > limit() && !spent() && go_back(lo, hi); ++depth)
       bound = std::min(bound, measure_against_lower(corners));
     return bound;
   }
 
-  /// Whether an overlay shows that a simplified triangle is within largest_ of the triangles in numbers_.
+  /// Whether an overlay shows that a simplified triangle is within limit() of the triangles in numbers_.
   /// @param bound set to its error bound if so
   bool is_near_lower(const Corners& corners, double& bound) {
     lower_positions_.clear(), lower_points_.clear(), lower_triangles_.clear(), lower_candidates_.clear();
@@ -331,7 +333,7 @@ private:
       return stated_error(distance, in_.levels.errors[numbers_[i]]);
     };
     lower_.overlay(corners, glm::cross(corners[1] - corners[0], corners[2] - corners[0]), lower_candidates_, overlay_);
-    if (!lower_.overlay_near([&](uint32_t i, double distance) { return stated(i, distance) <= largest_; }, near_))
+    if (!lower_.overlay_near([&](uint32_t i, double distance) { return stated(i, distance) <= limit(); }, near_))
       return false;
     bound = 0.0;
     for (const OverlayPiece& piece : near_) bound = std::max(bound, stated(piece.triangle, piece.distance));
@@ -348,7 +350,7 @@ private:
     };
     double largest = numbers_.empty() ? kInfinite : 0.0;
     refiner_.measure_corners(corners);
-    refiner_.run([&](double distance, uint32_t number) { return stated(distance, number) <= largest_; },
+    refiner_.run([&](double distance, uint32_t number) { return stated(distance, number) <= limit(); },
                  [&](uint32_t number, double distance) { largest = std::max(largest, stated(distance, number)); });
     return largest;
   }
@@ -357,7 +359,7 @@ private:
   SimplifyMesh& m_;
   SurfaceLinks& links_;
   SurfaceSide simplified_;
-  double largest_;                                ///< lower bound of the group's error
+  double largest_; ///< the group's floor, or an error that no measurement could bring below limit()
   std::vector<std::pair<double, uint32_t>> heap_; ///< error bounds; source triangles first, then simplified ones
   LinkLists linked_;                              ///< set up on first use
   std::vector<SurfaceLink> found_;
