@@ -18,6 +18,14 @@ void copy_plane(std::span<const Value> plane, auto& array) {
   });
 }
 
+void copy_guides(const SurfacePlanes& planes, GBuffer& out) {
+  copy_plane(planes.view_z, out.view_z), copy_plane(planes.normal, out.normal);
+  if (planes.motion_px.empty())
+    out.motion_px.assign(out.size.pixels(), Vec2(0));
+  else
+    copy_plane(planes.motion_px, out.motion_px), copy_plane(planes.previous_z, out.previous_z);
+}
+
 void copy_points(const PointPlanes& planes, GBuffer& out) {
   const size_t pixels = planes.offset.size();
   out.position.resize(pixels), out.geometric_normal.resize(pixels), out.offset.resize(pixels);
@@ -33,26 +41,30 @@ bool make_device_surfaces(const ViewTracer& tracer, const PrimaryCamera& now, co
       previous.camera.projection() == Projection::kEnvironment)
     return false;
   const std::optional<SurfacePlanes> planes =
-      tracer.make_surfaces(*gbuffer.on_gpu, now, previous.camera, double{kNoMotionPx});
+      tracer.make_surfaces(*gbuffer.on_gpu, now, previous.camera, double{kNoMotionPx}, gbuffer.guides_may_stay_on_gpu);
   if (!planes) return false;
-  copy_plane(planes->view_z, gbuffer.view_z), copy_plane(planes->normal, gbuffer.normal);
   copy_plane(planes->instance, gbuffer.instance);
-  if (planes->motion_px.empty())
-    gbuffer.motion_px.assign(gbuffer.size.pixels(), Vec2(0));
-  else
-    copy_plane(planes->motion_px, gbuffer.motion_px), copy_plane(planes->previous_z, gbuffer.previous_z);
+  gbuffer.guides_on_gpu = gbuffer.guides_may_stay_on_gpu;
+  if (!gbuffer.guides_on_gpu) copy_guides(*planes, gbuffer);
   gbuffer.points_on_gpu = gbuffer.points_may_stay_on_gpu;
   if (gbuffer.points_on_gpu)
     gbuffer.forget_points();
   else
-    copy_points(tracer.read_points(*gbuffer.on_gpu), gbuffer);
+    copy_points(tracer.read_points(*gbuffer.on_gpu, false), gbuffer);
   return true;
+}
+
+void read_device_guides(const ViewTracer& tracer, GBuffer& gbuffer) {
+  copy_guides(tracer.read_surfaces(*gbuffer.on_gpu), gbuffer);
+  gbuffer.guides_on_gpu = false;
 }
 
 void read_device_points(const ViewTracer& tracer, const GBuffer& gbuffer, GBuffer& out) {
   out.size = gbuffer.size;
+  const PointPlanes planes = tracer.read_points(*gbuffer.on_gpu, gbuffer.guides_on_gpu);
   out.normal = gbuffer.normal;
-  copy_points(tracer.read_points(*gbuffer.on_gpu), out);
+  if (gbuffer.guides_on_gpu) copy_plane(planes.normal, out.normal);
+  copy_points(planes, out);
 }
 
 } // namespace packtrace

@@ -12,6 +12,9 @@ namespace packtrace {
 bool make_device_surfaces(const ViewTracer& tracer, const PrimaryCamera& now, const PreviousFrame& previous,
                           GBuffer& gbuffer);
 
+/// Fills in the arrays that stayed on a GPU (GBuffer::guides_on_gpu).
+void read_device_guides(const ViewTracer& tracer, GBuffer& gbuffer);
+
 /// Reads points that stayed on a GPU (GBuffer::points_on_gpu) into the arrays of another G-buffer, with the shading
 /// normals.
 void read_device_points(const ViewTracer& tracer, const GBuffer& gbuffer, GBuffer& out);

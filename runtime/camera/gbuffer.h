@@ -60,6 +60,10 @@ struct GBuffer {
   /// and these arrays are empty.
   bool points_may_stay_on_gpu = false;
   bool points_on_gpu = false;
+  /// It may leave view_z, normal, motion_px and previous_z there, too. Then `guides_on_gpu` is true, and these arrays
+  /// have their sizes, but their values have no meaning until read_device_guides() fills them in.
+  bool guides_may_stay_on_gpu = false;
+  bool guides_on_gpu = false;
 
   /// Makes all pixels misses.
   void resize(ImageSize new_size) {
@@ -84,6 +88,11 @@ struct GBuffer {
   /// Frees position, geometric_normal and offset, from which rays start.
   void forget_points() {
     position = PixelArray<Vec3>(), geometric_normal = PixelArray<Vec3>(), offset = PixelArray<float>();
+  }
+  /// Marks that nothing has moved since the camera rays were traced.
+  void forget_motion() {
+    motion_px.assign(motion_px.size(), Vec2(0));
+    previous_z.clear();
   }
   bool has_points() const { return points_on_gpu || position.size() == size.pixels(); }
 

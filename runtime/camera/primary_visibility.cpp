@@ -326,7 +326,7 @@ float pixel_width(const PrimaryCamera& camera, float view_z) {
 
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress, const TextureFilter& textures) {
-  gbuffer.points_on_gpu = false;
+  gbuffer.points_on_gpu = gbuffer.guides_on_gpu = false;
   gbuffer.make_room(now.size());
   gbuffer.pixel_spread = static_cast<float>(now.pixel_spread());
   PrimaryTracer primary(source, tracer, now, previous, textures, gbuffer);

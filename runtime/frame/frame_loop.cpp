@@ -16,12 +16,6 @@
 namespace packtrace {
 namespace {
 
-/// Marks that nothing has moved since the G-buffer was traced.
-void forget_motion(GBuffer& gbuffer) {
-  gbuffer.motion_px.assign(gbuffer.motion_px.size(), Vec2(0));
-  gbuffer.previous_z.clear();
-}
-
 FrameConfig validated(const FrameConfig& config, const FrameScene& scene) {
   config.validate();
   packtrace::validate(config.ao);
@@ -135,6 +129,7 @@ void FrameLoop::accumulate(const GBuffer& shaded) {
     if (report_.moved) raw_mean_.clear();
     raw_mean_.add(raw_);
   } else if (config_.jitters() && !report_.moved) {
+    read_surfaces();
     layers_.write_guides(gbuffer_, guides_);
     denoiser_.add_frame(guides_, raw_, HistorySource::kPixel);
   } else {
@@ -159,15 +154,15 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   if (passing) denoiser_.free_spare_memory();
   const bool trace = traces(still_frames_);
   const PrimaryCamera view = view_of(camera, still_frames_);
-  if (trace && !moved) layers_.keep(gbuffer_);
+  if (trace && !moved) keep_layers();
   if (trace)
     trace_camera_rays(view, progress);
   else if (still_frames_ == 1)
-    forget_motion(gbuffer_);
+    gbuffer_.forget_motion();
   report_.seen = report_.hit_pixels > 0;
 
   const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
-  if (quarter && still_frames_ == 1) forget_motion(half_.gbuffer);
+  if (quarter && still_frames_ == 1) half_.gbuffer.forget_motion();
   const GBuffer& shaded = shaded_surfaces();
   const Stopwatch limiting;
   std::vector<float> limits;
@@ -270,6 +265,7 @@ void FrameLoop::show_layers(const FrameConfig& config) {
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   PassTimes& times = report.times;
   require_surfaces(false);
+  if (reads_surfaces()) read_surfaces();
   read_samples();
   std::vector<float> raw_mean;
   const std::span<const float> ao = accumulated_ao(raw_mean, report);

@@ -88,8 +88,11 @@ public:
   const ShadeScene* shade_scene() const { return shading_.scene(); }
   const DetailPlanner* detail() const { return state_.planner(); }
   const AoDenoiser& denoiser() const { return denoiser_; }
-  /// Camera rays of the last frame that traced any.
-  const GBuffer& gbuffer() const { return gbuffer_; }
+  /// Camera rays of the last frame that traced any. Reads what stayed on a GPU.
+  const GBuffer& gbuffer() {
+    read_surfaces();
+    return gbuffer_;
+  }
   /// Traces the camera ray of a pixel of the last traced frame again and returns its hit. Needs a frame.
   std::optional<CameraHit> hit_at(uint32_t x, uint32_t y) const;
 
@@ -97,6 +100,9 @@ private:
   void trace_camera_rays(const PrimaryCamera& view, Progress& progress);
   void trace_still(const Camera& camera, uint32_t frames, bool plans);
   void require_surfaces(bool points);
+  bool reads_surfaces() const;
+  void read_surfaces();
+  void keep_layers();
   bool leaves_samples_on_gpu() const;
   const GBuffer& shaded_surfaces() const;
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;

@@ -5,6 +5,7 @@
 
 #include "runtime/ao/view_occlusion.h"
 #include "runtime/camera/deformed_past.h"
+#include "runtime/camera/device_surfaces.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/frame/frame_loop.h"
@@ -64,7 +65,9 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress)
                              surfaces ? &*surfaces : nullptr};
   gbuffer_.keep_channels(channels_);
   gbuffer_.points_may_stay_on_gpu = leaves_samples_on_gpu() && config_.ao_rate != AoRate::kAdaptive &&
-                                    traces_view_occlusion(config_.ao, {}) && state_.moved_boxes().empty();
+                                    traces_view_occlusion(config_.ao, {}) && state_.moved_boxes().empty() &&
+                                    !config_.proxy_beyond_px;
+  gbuffer_.guides_may_stay_on_gpu = gbuffer_.points_may_stay_on_gpu && report_.moved && !reads_surfaces();
   const TextureFilter textures{
       config_.shades() ? &shading_.prepare(*scene().source, scene().memory).textures() : nullptr, footprint_px()};
   trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen, textures);
@@ -95,7 +98,7 @@ void FrameLoop::trace_still(const Camera& camera, uint32_t frames, bool plans) {
   for (still_frames_ = 0;; ++still_frames_) {
     report_.moved = plans && still_frames_ == 0;
     if (traces(still_frames_)) {
-      if (still_frames_ > 0) layers_.keep(gbuffer_);
+      if (still_frames_ > 0) keep_layers();
       const PrimaryCamera view = view_of(camera, still_frames_);
       trace_camera_rays(view, unseen);
       layers_.add(gbuffer_, scene().source->materials());
@@ -103,6 +106,26 @@ void FrameLoop::trace_still(const Camera& camera, uint32_t frames, bool plans) {
     }
     if (still_frames_ == frames) break;
   }
+}
+
+/// Whether the host reads depths, normals or motion of each frame.
+bool FrameLoop::reads_surfaces() const {
+  return config_.plain_layers != 0 || config_.view_layers || config_.surface_layers || config_.cost_layers ||
+         config_.lod_layers || config_.shades() || config_.supersample != 1 || config_.proxy_beyond_px ||
+         config_.detail.only_occlusion;
+}
+
+/// Fills in the arrays of the G-buffer that stayed on the GPU.
+void FrameLoop::read_surfaces() {
+  if (!gbuffer_.guides_on_gpu) return;
+  read_device_guides(dynamic_cast<const ViewTracer&>(*tracers().front()), gbuffer_);
+  if (still_frames_ > 0) gbuffer_.forget_motion();
+}
+
+/// Keeps the first frame's layers, to which further frames of the view will be added.
+void FrameLoop::keep_layers() {
+  read_surfaces();
+  layers_.keep(gbuffer_);
 }
 
 /// Whether ambient occlusion stays on the GPU that traces it, for the denoiser there.

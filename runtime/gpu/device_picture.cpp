@@ -30,7 +30,7 @@ std::shared_ptr<DeviceView> DeviceRays::trace_view(const View& view, uint32_t ra
     reused.reset();
     reused = std::make_shared<DeviceView>(s.device, pixels);
   }
-  reused->set_surfaces(false);
+  reused->set_surfaces(false, false);
   Commands commands;
   s.write_view(commands, view);
   s.device->run(commands);
@@ -56,7 +56,21 @@ void DeviceRays::set_surfaces(std::span<const InstanceSurface> instances, std::s
 
 uint64_t DeviceRays::surface_bytes() const { return state_->instances.bytes() + state_->lookup.bytes(); }
 
-void DeviceRays::make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces) {
+namespace {
+/// Planes that are read back together.
+struct PlaneRange {
+  uint32_t first, end;
+};
+/// Depths, normals, instances, and motion with previous depths where surfaces moved.
+PlaneRange surface_planes(bool moved) { return {kViewZPlane, moved ? kPositionPlane : kMotionPlane}; }
+
+uint64_t plane_bytes(const DeviceView& picture, uint32_t planes) {
+  return uint64_t{planes} * sizeof(uint32_t) * picture.pixels();
+}
+} // namespace
+
+void DeviceRays::make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces,
+                               bool only_instances) {
   State& s = *state_;
   s.follow_scene();
   const StagedBuffer& planes = picture.planes();
@@ -75,14 +89,22 @@ void DeviceRays::make_surfaces(DeviceView& picture, const View& view, const Surf
     const SpanRecord span{static_cast<uint32_t>(first), static_cast<uint32_t>(count), 0, 0};
     commands.dispatch(*s.surfaces_kernel, push_bytes(span), groups_of(count), 1);
   }
-  const uint64_t words = surfaces.moved != 0 ? kPositionPlane : kMotionPlane;
-  commands.copy(planes.device(), planes.host(), words * sizeof(uint32_t) * picture.pixels());
+  const PlaneRange read =
+      only_instances ? PlaneRange{kInstancePlane, kInstancePlane + 1} : surface_planes(surfaces.moved != 0);
+  const uint64_t begin = plane_bytes(picture, read.first), bytes = plane_bytes(picture, read.end - read.first);
+  commands.copy(planes.device(), planes.host(), begin, begin, bytes);
   s.device->run(commands);
-  picture.set_surfaces(true);
+  picture.set_surfaces(true, surfaces.moved != 0);
+}
+
+void DeviceRays::read_surfaces(const DeviceView& picture) const {
+  const PlaneRange read = surface_planes(picture.has_motion());
+  const uint64_t begin = plane_bytes(picture, read.first), bytes = plane_bytes(picture, read.end - read.first);
+  state_->device->copy(picture.planes().device(), picture.planes().host(), begin, begin, bytes);
 }
 
 void DeviceRays::read_points(const DeviceView& picture) const {
-  const uint64_t begin = uint64_t{kPositionPlane} * sizeof(uint32_t) * picture.pixels();
+  const uint64_t begin = plane_bytes(picture, kPositionPlane);
   const StagedBuffer& planes = picture.planes();
   state_->device->copy(planes.device(), planes.host(), begin, begin, planes.bytes() - begin);
 }

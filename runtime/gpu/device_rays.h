@@ -54,10 +54,12 @@ public:
   /// Uploads the tables of instances and clusters that make_surfaces() reads.
   /// @param lookup instance of each placement, then the words of a NormalRecord for each cluster
   void set_surfaces(std::span<const InstanceSurface> instances, std::span<const uint32_t> lookup);
-  /// Makes the planes of a picture that trace_view() traced, and reads those before the points' back. Without
-  /// surfaces.moved, motion and previous depths are not read back either. Needs set_surfaces(). Throws as Buffer does.
+  /// Makes the planes of a picture that trace_view() traced. Needs set_surfaces(). Throws as Buffer does.
   /// @param view the picture's
-  void make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces);
+  /// @param only_instances read only this plane back; otherwise all that read_surfaces() reads
+  void make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces, bool only_instances);
+  /// Reads depths, normals and instances back, and motion and previous depths if they have a meaning.
+  void read_surfaces(const DeviceView& picture) const;
   /// Reads the planes of the points back.
   void read_points(const DeviceView& picture) const;
   /// Device memory of set_surfaces().

@@ -27,7 +27,9 @@ public:
   const StagedBuffer& planes() const { return planes_; }
   /// Whether the planes are those of the hits.
   bool has_surfaces() const { return has_surfaces_; }
-  void set_surfaces(bool made) { has_surfaces_ = made; }
+  /// Whether their surfaces moved in the picture since the last one: else the planes of motion have no meaning.
+  bool has_motion() const { return has_motion_; }
+  void set_surfaces(bool made, bool moved) { has_surfaces_ = made, has_motion_ = moved; }
   /// A plane that was read back.
   template <typename Value>
   std::span<const Value> plane(uint32_t number) const {
@@ -40,7 +42,7 @@ private:
   std::shared_ptr<Device> device_;
   size_t pixels_;
   StagedBuffer hits_, planes_;
-  bool has_surfaces_ = false;
+  bool has_surfaces_ = false, has_motion_ = false;
 };
 
 } // namespace packtrace::gpu

@@ -54,6 +54,7 @@ struct SurfacePlanes {
 };
 struct PointPlanes {
   std::span<const Vec3> position, geometric_normal;
+  std::span<const Vec3> normal; ///< may be empty
   std::span<const float> offset;
 };
 
@@ -102,10 +103,14 @@ public:
   /// @param now the picture's camera
   /// @param previous not an environment camera; motion is that of surfaces at rest since this camera
   /// @param no_motion_px kNoMotionPx
+  /// @param only_instances whether the other planes stay on the device until read_surfaces(), and are empty here
   virtual std::optional<SurfacePlanes> make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
-                                                     const PrimaryCamera& previous, double no_motion_px) const = 0;
+                                                     const PrimaryCamera& previous, double no_motion_px,
+                                                     bool only_instances) const = 0;
+  /// Reads all planes of such surfaces.
+  virtual SurfacePlanes read_surfaces(const gpu::DeviceView& picture) const = 0;
   /// Reads the points of such surfaces.
-  virtual PointPlanes read_points(const gpu::DeviceView& picture) const = 0;
+  virtual PointPlanes read_points(const gpu::DeviceView& picture, bool with_normals) const = 0;
 
   /// Makes the occlusion rays of all points and sums up what they meet: the bits that trace_ao() computes from spans of
   /// rays.

@@ -55,6 +55,19 @@ gpu::DeviceRays::View view_of(const PrimaryCamera& camera, const UnitSpace& spac
   return view;
 }
 
+/// Planes that were read back.
+SurfacePlanes surface_planes(const gpu::DeviceView& picture) {
+  SurfacePlanes planes{picture.plane<float>(gpu::kViewZPlane),
+                       picture.plane<Vec3>(gpu::kNormalPlane),
+                       picture.plane<uint32_t>(gpu::kInstancePlane),
+                       {},
+                       {}};
+  if (picture.has_motion())
+    planes.motion_px = picture.plane<Vec2>(gpu::kMotionPlane),
+    planes.previous_z = picture.plane<float>(gpu::kPreviousZPlane);
+  return planes;
+}
+
 } // namespace
 
 GpuTracer::GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers,
@@ -150,7 +163,8 @@ std::span<const RayHit> GpuTracer::hits(const gpu::DeviceView& picture) const {
 }
 
 std::optional<SurfacePlanes> GpuTracer::make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
-                                                      const PrimaryCamera& previous, double no_motion_px) const {
+                                                      const PrimaryCamera& previous, double no_motion_px,
+                                                      bool only_instances) const {
   constexpr double kMaxScale = 0x1p80; // devices may flush denormal floats, which surfaces in smaller units have
   if (!(space().scale() <= kMaxScale && space().scale() >= 1.0 / kMaxScale)) return std::nullopt;
   const gpu::SurfaceViewRecord record = surface_view_record(now, previous, space(), no_motion_px);
@@ -160,28 +174,34 @@ std::optional<SurfacePlanes> GpuTracer::make_surfaces(gpu::DeviceView& picture, 
       const SurfaceTables tables = surface_tables(file_, source_, packed_);
       device_rays_->set_surfaces(tables.instances, tables.lookup);
     }
-    device_rays_->make_surfaces(picture, view_of(now, space()), record);
+    device_rays_->make_surfaces(picture, view_of(now, space()), record, only_instances);
   } catch (const Error& error) {
     surfaces_uploaded_ = false;
     if (error.kind() != ErrorKind::kLimitExceeded && error.kind() != ErrorKind::kUnsupported) throw;
     return std::nullopt;
   }
-  SurfacePlanes planes{picture.plane<float>(gpu::kViewZPlane),
-                       picture.plane<Vec3>(gpu::kNormalPlane),
-                       picture.plane<uint32_t>(gpu::kInstancePlane),
-                       {},
-                       {}};
-  if (record.moved != 0)
-    planes.motion_px = picture.plane<Vec2>(gpu::kMotionPlane),
-    planes.previous_z = picture.plane<float>(gpu::kPreviousZPlane);
-  return planes;
+  if (only_instances) return SurfacePlanes{{}, {}, picture.plane<uint32_t>(gpu::kInstancePlane), {}, {}};
+  return surface_planes(picture);
+}
+
+SurfacePlanes GpuTracer::read_surfaces(const gpu::DeviceView& picture) const {
+  const std::lock_guard lock(device_rays_mutex_);
+  device_rays_->read_surfaces(picture);
+  return surface_planes(picture);
 }
 
 /// Takes no lock: leave_occlusion() may call it through OcclusionPoints::write().
-PointPlanes GpuTracer::read_points(const gpu::DeviceView& picture) const {
+PointPlanes GpuTracer::read_points(const gpu::DeviceView& picture, bool with_normals) const {
   device_rays_->read_points(picture);
-  return {picture.plane<Vec3>(gpu::kPositionPlane), picture.plane<Vec3>(gpu::kGeometricPlane),
-          picture.plane<float>(gpu::kOffsetPlane)};
+  PointPlanes planes{picture.plane<Vec3>(gpu::kPositionPlane),
+                     picture.plane<Vec3>(gpu::kGeometricPlane),
+                     {},
+                     picture.plane<float>(gpu::kOffsetPlane)};
+  if (with_normals) {
+    device_rays_->read_surfaces(picture);
+    planes.normal = picture.plane<Vec3>(gpu::kNormalPlane);
+  }
+  return planes;
 }
 
 /// Traces the rays of all points, of as many at once as there is memory for.

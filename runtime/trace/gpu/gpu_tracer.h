@@ -42,9 +42,11 @@ public:
                                                 std::shared_ptr<gpu::DeviceView> reused,
                                                 const Progress& progress) const override;
   std::span<const RayHit> hits(const gpu::DeviceView& picture) const override;
+  SurfacePlanes read_surfaces(const gpu::DeviceView& picture) const override;
   std::optional<SurfacePlanes> make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
-                                             const PrimaryCamera& previous, double no_motion_px) const override;
-  PointPlanes read_points(const gpu::DeviceView& picture) const override;
+                                             const PrimaryCamera& previous, double no_motion_px,
+                                             bool only_instances) const override;
+  PointPlanes read_points(const gpu::DeviceView& picture, bool with_normals) const override;
   void trace_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples, std::span<OcclusionSums> sums,
                        Progress& progress) const override;
   std::shared_ptr<gpu::DeviceAo> leave_occlusion(const OcclusionPoints& points, const OcclusionSamples& samples,

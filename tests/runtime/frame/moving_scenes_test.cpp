@@ -203,7 +203,7 @@ TEST(FrameLoop, LevelsOfDetailGoWithDeformingMeshes) {
     for (FrameLoop* loop : {&plain, &same, &coarser, &lifted}) loop->next_frame(camera, frame / kFps, progress);
     size_t different = 0;
     for (size_t i = 0; i < plain.gbuffer().instance.size(); ++i) {
-      const auto near = [&](const FrameLoop& other) {
+      const auto near = [&](FrameLoop& other) {
         return other.gbuffer().instance[i] == plain.gbuffer().instance[i] &&
                std::abs(other.gbuffer().view_z[i] - plain.gbuffer().view_z[i]) < 1e-3f;
       };
