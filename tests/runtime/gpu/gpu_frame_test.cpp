@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -53,6 +54,59 @@ protected:
 };
 
 TEST_F(GpuFrameTest, PicturesAreThoseOfPacked) { expect_same_pictures(); }
+
+/// As in a window: depths, normals and motion of moving frames stay on the device until a layer shows them.
+TEST_F(GpuFrameTest, OcclusionAlone) {
+  settings_.plain_layers = 0, settings_.all_channels = false;
+  expect_same_pictures();
+  settings_.jitter = false;
+  expect_same_pictures();
+}
+
+TEST_F(GpuFrameTest, LayersOfAMovingFrameThatAreShownLater) {
+  settings_.plain_layers = 0, settings_.all_channels = false;
+  FrameConfig with_layers = settings_;
+  with_layers.plain_layers = kDepthLayer | kNormalLayer, with_layers.view_layers = true;
+  FrameLoop expected(scene(Backend::kPacked), with_layers), on_gpu(scene(Backend::kGpu), settings_);
+  Progress progress;
+  for (const double x : {0.0, 0.1, 0.1}) { // the last frame is still
+    RenderedImage pictures[2];
+    PictureReport reports[2];
+    const Camera camera = test::camera_at({x, 3, -12}, {0, 1, 0});
+    expected.next_frame(camera, 0.0, progress), on_gpu.next_frame(camera, 0.0, progress);
+    expected.resolve(pictures[0], reports[0]), on_gpu.resolve(pictures[1], reports[1]);
+    EXPECT_TRUE(pictures[1].depth.empty());
+    on_gpu.show_layers(with_layers);
+    on_gpu.resolve(pictures[1], reports[1]);
+    on_gpu.show_layers(settings_);
+    EXPECT_EQ(pictures[1].depth, pictures[0].depth) << x;
+    EXPECT_EQ(pictures[1].normal, pictures[0].normal) << x;
+    EXPECT_EQ(on_gpu.gbuffer().motion_px, expected.gbuffer().motion_px) << x;
+  }
+}
+
+/// The error of proxies is measured from points, which must not stay on the device then.
+TEST_F(GpuFrameTest, Proxies) {
+  BakeConfig config;
+  config.proxy.use = ProxyUse::kVoxels;
+  Scene spheres;
+  test::add_object(spheres, test::sphere({0, 0, 0}, 2, 64));
+  for (const double x : {-2.0, 2.0}) spheres.instances.push_back({0, Affine(test::placed({x, 1, 0}, DVec3(1), 0))});
+  const test::BakedScene baked(spheres, config);
+  settings_.plain_layers = 0, settings_.all_channels = false;
+  settings_.proxy_beyond_px = 1000.0, settings_.proxy_error = 1.0;
+  std::optional<double> errors[2];
+  for (const Backend backend : {Backend::kPacked, Backend::kGpu}) {
+    FrameScene scene{&baked.source, &baked.file, {}};
+    scene.backend.backend = backend, scene.backend.gpu = config_;
+    FrameLoop loop(scene, settings_);
+    Progress progress;
+    loop.next_frame(test::camera_at({0, 3, -12}, {0, 1, 0}), 0.0, progress);
+    errors[backend == Backend::kGpu] = loop.proxy_error();
+  }
+  ASSERT_TRUE(errors[0]);
+  EXPECT_EQ(errors[1], errors[0]);
+}
 
 TEST_F(GpuFrameTest, AQuarterOfThePixels) {
   settings_.ao_resolution = AoResolution::kQuarter;
