@@ -112,9 +112,10 @@ TEST_P(PageCodecs, FilesOfManyPagesAreSmallAndTheSameForAnyThreadCount) {
   for (const uint64_t bytes : baked.report.file.disk.stream_bytes) streams += bytes;
   EXPECT_EQ(streams, baked.bytes.size());
   EXPECT_LT(baked.bytes.size(), baked.report.file.bytes.total / 2);
+  (void)BakedFile::from_bytes(baked.bytes);
+  if (test::sanitized()) return; // equal bytes for any number of threads are compared in release builds
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
   EXPECT_TRUE(test::bake(scene, config_of(GetParam())).bytes == baked.bytes);
-  (void)BakedFile::from_bytes(baked.bytes);
 }
 
 TEST_P(PageCodecs, WhatEncodersDoNotWriteIsStored) {

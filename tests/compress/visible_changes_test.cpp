@@ -181,7 +181,7 @@ TEST(NarrowGaps, KeepTheirWidth) {
 }
 
 TEST(NarrowGaps, AreReportedIfAStatedStepChangesThem) {
-  Scene scene = box_scene(plates_mesh(0.3, 0.02, 90));
+  Scene scene = box_scene(plates_mesh(0.3, 0.02, 30));
   scene.cameras[0] = camera_at({0, 8, -53}, {0, 0, 0});
   const double step = step_of(BakedFile::from_bytes(bake(scene).bytes).geometries()[0]);
   const BakedScene baked = bake(scene, test::precision(PrecisionKind::kAbsolute, 2.0 * step));

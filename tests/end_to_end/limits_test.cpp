@@ -119,17 +119,17 @@ TEST(Limits, ComparedImagesAskForMemoryToo) {
   bench.bake();
   const std::string png = bench / "a.png", exr = bench / "a.exr";
   ASSERT_EQ(
-      run_packtrace({"render", bench.baked(), "-o", png, "-o", exr, "-q", "--spp", "1", "--size", "512x512"}).exit_code,
+      run_packtrace({"render", bench.baked(), "-o", png, "-o", exr, "-q", "--spp", "1", "--size", "256x256"}).exit_code,
       0);
   for (const std::string& image : {png, exr}) {
     ASSERT_TRUE(fs::exists(image)) << image;
     if (!sanitized()) { // slow
-      EXPECT_EQ(run_packtrace({"compare", image, image, "--max-memory", "64M"}).exit_code, 0);
+      EXPECT_EQ(run_packtrace({"compare", image, image, "--max-memory", "16M"}).exit_code, 0);
     }
-    const CommandResult large = run_packtrace({"compare", image, image, "--max-memory", "2M"});
+    const CommandResult large = run_packtrace({"compare", image, image, "--max-memory", "512K"});
     EXPECT_EQ(large.exit_code, 3);
     EXPECT_NE(large.err.find(image + ": the image needs "), std::string::npos) << large.err;
-    const CommandResult larger = run_packtrace({"compare", image, image, "--max-memory", "20M"});
+    const CommandResult larger = run_packtrace({"compare", image, image, "--max-memory", "5M"});
     EXPECT_EQ(larger.exit_code, 3);
     EXPECT_NE(larger.err.find("comparing the images needs "), std::string::npos) << larger.err;
   }

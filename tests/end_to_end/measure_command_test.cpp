@@ -11,7 +11,7 @@
 
 #include <sys/resource.h>
 
-#include "tests/end_to_end/workbench.h"
+#include "tests/end_to_end/measured_report.h"
 #include "tests/sanitized.h"
 
 namespace packtrace::test {
@@ -27,10 +27,38 @@ CommandResult measure(const Workbench& bench, std::vector<std::string> more = {}
   return run_packtrace(words);
 }
 
+} // namespace
+
+MeasuredReport::MeasuredReport() {
+  const std::vector<std::string> words{"measure", bench.scene(), "-o", bench / "report", "--quick", "--width",
+                                       "16",      "--spp",       "1"};
+  full = run_packtrace(words, [] { // room for the float pictures, not for a baked file
+    const rlimit limit{2000, 2000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  });
+  work_left = fs::exists(bench / "report/work");
+  continued = run_packtrace(words);
+}
+
+const MeasuredReport& measured_report() {
+  static const MeasuredReport report;
+  return report;
+}
+
+namespace {
+
+TEST(Measure, StopsAtAFullDiskAndContinues) {
+  const MeasuredReport& report = measured_report();
+  EXPECT_EQ(report.full.exit_code, 6) << report.full.err;
+  EXPECT_NE(report.full.err.find("bake of point default failed"), std::string::npos) << report.full.err;
+  EXPECT_NE(report.full.err.find("the same command continues"), std::string::npos) << report.full.err;
+  EXPECT_FALSE(report.work_left);
+  EXPECT_EQ(report.continued.exit_code, 0) << report.continued.err;
+}
+
 TEST(Measure, WritesAReportWithPictures) {
-  const Workbench bench;
-  const CommandResult result = measure(bench);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Workbench& bench = measured_report().bench;
+  ASSERT_EQ(measured_report().continued.exit_code, 0);
   const Json report = Json::parse(read_text(bench / "report/report.json"));
   EXPECT_EQ(report["schema"], "packtrace-measure");
   EXPECT_EQ(report["schema_version"], 1);
@@ -64,21 +92,6 @@ TEST(Measure, ContinuesAndRefusesTheFolderOfAChangedScene) {
   EXPECT_EQ(changed.exit_code, 6) << changed.err;
   EXPECT_NE(changed.err.find("--force"), std::string::npos) << changed.err;
   EXPECT_EQ(measure(bench, {"--force"}).exit_code, 0);
-}
-
-TEST(Measure, StopsAtAFullDiskAndContinues) {
-  const Workbench bench;
-  const std::vector<std::string> words{"measure", bench.scene(), "-o", bench / "report", "--quick", "--width",
-                                       "16",      "--spp",       "1"};
-  const CommandResult full = run_packtrace(words, [] { // room for the float pictures, not for a baked file
-    const rlimit limit{2000, 2000};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  });
-  EXPECT_EQ(full.exit_code, 6) << full.err;
-  EXPECT_NE(full.err.find("bake of point default failed"), std::string::npos) << full.err;
-  EXPECT_NE(full.err.find("the same command continues"), std::string::npos) << full.err;
-  EXPECT_FALSE(fs::exists(bench / "report/work"));
-  EXPECT_EQ(run_packtrace(words).exit_code, 0);
 }
 
 TEST(Measure, DenoisesWithTheChosenPreset) {

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/measure/stability.h"
-#include "tests/end_to_end/workbench.h"
+#include "tests/end_to_end/measured_report.h"
 
 namespace packtrace::test {
 namespace {
@@ -144,10 +144,8 @@ void compare(const Shape& shape, const Shape& point, const std::vector<const Jso
 }
 
 TEST(ReportSchema, HasExactlyTheDocumentedKeys) {
-  const Workbench bench;
-  const CommandResult result =
-      run_packtrace({"measure", bench.scene(), "-o", bench / "report", "--quick", "--width", "32", "--spp", "4", "-q"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Workbench& bench = measured_report().bench;
+  ASSERT_EQ(measured_report().continued.exit_code, 0);
   const Shape documented = documented_report();
   ASSERT_GT(documented.keys.size(), 20u);
   ASSERT_GT(documented.keys.at("points").keys.size(), 20u);

@@ -17,6 +17,7 @@
 #include "pbrt_import/base/file_bytes.h"
 #include "runtime/image/read_image.h"
 #include "tests/runtime/image/image_test_support.h"
+#include "tests/sanitized.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -129,7 +130,8 @@ TEST(Exr, EveryTruncatedPrefixIsRejected) {
 TEST(Exr, FlippedBitsGiveErrorsOrImagesButNothingElse) {
   const Bytes file = Frame().encode({{"a", std::string("b")}});
   size_t rejected = 0;
-  for (size_t bit = 0; bit < 8 * file.size(); ++bit) {
+  const size_t step = test::sanitized() ? 3 : 1; // every byte, and each of its bits in some
+  for (size_t bit = 0; bit < 8 * file.size(); bit += step) {
     Bytes altered = file;
     altered[bit / 8] ^= static_cast<std::byte>(1u << (bit % 8));
     decode_all(altered);
@@ -139,7 +141,7 @@ TEST(Exr, FlippedBitsGiveErrorsOrImagesButNothingElse) {
       ++rejected;
     }
   }
-  EXPECT_GT(rejected, 100u);
+  EXPECT_GT(rejected, 100u / step);
 }
 
 TEST(Exr, ClaimsOfHugeSizesFailBeforeAllocating) {

@@ -227,7 +227,7 @@ TEST(LodCut, AllowedErrorsBracketEveryGroup) {
 
 TEST(LodCut, OfAClosedMeshIsClosedFromAnyEye) {
   if (test::sanitized()) GTEST_SKIP() << test::kOthersRunItsCode;
-  const test::BuiltLod built = test::build_lod(test::half_faceted(test::torus_mesh(160, 96)));
+  const test::BuiltLod built = test::build_lod(test::half_faceted(test::torus_mesh(100, 60)));
   const LodGeometry geometry = test::records_of(built).geometry();
   std::set<std::vector<uint64_t>> seen;
   size_t levels_used = 0;
