@@ -24,9 +24,10 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
   export PACKTRACE_SCENES
 fi
 begin_stage "Debian packages"
-# Some tests need these: clang compiles the fuzz preset's kernels, shells and man tools check the generated files, and
+# Checks link some hundred programs, each with the whole product: lld takes a third of the time of GNU ld.
+# Some tests need the others: clang compiles the fuzz preset's kernels, shells and man tools check the generated files, and
 # Chromium opens the HTML report.
-bash .ci/install_packages.sh window tests benchmarks python clang-19 clang-format-19 clang-tidy-19 zsh fish mandoc groff-base chromium
+bash .ci/install_packages.sh window tests benchmarks python clang-19 clang-format-19 clang-tidy-19 lld zsh fish mandoc groff-base chromium
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
 begin_stage "Format"
 find pbrt_import compress runtime tests assets docs \( -name '*.h' -o -name '*.cpp' \) -print0 |
@@ -45,11 +46,17 @@ for preset in "${presets[@]}"; do
   begin_stage "Configure ($preset)"
   # Scripts and the Python module are tested with Debian's interpreter, whichever comes first in the PATH.
   options=(-DPython_EXECUTABLE=/usr/bin/python3)
+  for kind in EXE SHARED MODULE; do options+=("-DCMAKE_${kind}_LINKER_FLAGS=-fuse-ld=lld"); done
   case $preset in # with the same options, asan finds the objects of tests in ccache
     release)
       options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all -DPACKTRACE_BUILD_PYTHON=ON -DPACKTRACE_TEST_PROGRAMS=ON)
       ;;
-    asan) options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all) ;;
+    asan) # without the GPU and the window, which no test opens there
+      options+=(-DPACKTRACE_WERROR=ON -DPACKTRACE_UNITY=all -DPACKTRACE_GPU=OFF -DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON)
+      corpus=
+      [[ " ${presets[*]} " != *" release "*" asan "* ]] || corpus=$PWD/build/release/tests/fuzz/baked_corpus # built above
+      options+=("-DPACKTRACE_BAKED_CORPUS=$corpus")
+      ;;
   esac
   cmake --preset "$preset" "${options[@]}" >/dev/null
   [ "$preset" != release ] || { begin_stage "clang-tidy" && .ci/clang_tidy.sh; }

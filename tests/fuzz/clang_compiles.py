@@ -28,13 +28,21 @@ def uses_vectors(path, seen):
     return bool(VECTORS.search(text)) or any(uses_vectors(SOURCE / name, seen) for name in INCLUDE.findall(text))
 
 
+def batch_of_vectors(path):
+    """Of a batch of sources (CMake's unity build) those that use vectors, as a source; None for other files."""
+    if "Unity" not in path.parts:
+        return None
+    sources = INCLUDE.findall(path.read_text())
+    return "".join(f'#include "{source}"\n' for source in sources if uses_vectors(pathlib.Path(source), set()))
+
+
 def clang_command(clang, command):
-    """GCC's command without the launcher, the output, choices of warnings and GCC's precompiled headers."""
+    """GCC's command without the launcher, the source, the output, choices of warnings and GCC's precompiled headers."""
     words = shlex.split(command)
     words = words[next(i for i, word in enumerate(words) if re.search(r"(^|/)(c|g)\+\+", word)) + 1:]
     kept = [word for word in words
             if not re.match(r"-W|-o$|-c$|-fsanitize|-fpch-preprocess$|-include$|.*(\.o|cmake_pch\.hxx)$", word)]
-    return [clang, "-fsyntax-only", "-w", "-D_GLIBCXX_ASSERTIONS", *kept]
+    return [clang, "-fsyntax-only", "-w", "-D_GLIBCXX_ASSERTIONS", *kept[:-1], "-x", "c++"]
 
 
 def main():
@@ -54,11 +62,14 @@ def main():
         print("no source uses vectors: the search for them is broken")
         return 1
 
-    def compile_one(entry):
-        return subprocess.run(clang_command(clang, entry["command"]), cwd=entry["directory"], capture_output=True, text=True)
+    def compile_one(item):
+        path, entry = item
+        batch = batch_of_vectors(path)
+        return subprocess.run([*clang_command(clang, entry["command"]), str(path) if batch is None else "-"], input=batch or "",
+                              cwd=entry["directory"], capture_output=True, text=True)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        results = list(zip(chosen, pool.map(compile_one, chosen.values())))
+        results = list(zip(chosen, pool.map(compile_one, chosen.items())))
     for path, result in results:
         if result.returncode != 0:
             print(f"{path.relative_to(SOURCE)}: does not compile\n{result.stderr}")
