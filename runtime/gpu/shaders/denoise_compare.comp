@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_basic : require
 // Sets changes[0] and changes[1] unless the guides are those of the frame before and nothing moves.
 #include "denoise.glsl"
 
@@ -17,7 +18,6 @@ void main() {
   for (uint i = gl_GlobalInvocationID.x; i < pixel_count() && changes[0] == 0u; i += stride) {
     vec3 normal = vec3(normals[3u * i], normals[3u * i + 1u], normals[3u * i + 2u]);
     if (is_still(motions[i]) && guide_of(view_z[i], normal, instances[i]) == guides_before[i]) continue;
-    changes[0] = 1u;
-    changes[1] = 1u;
+    if (subgroupElect()) changes[0] = changes[1] = 1u; // threads that write the same word wait for each other
   }
 }
