@@ -150,10 +150,11 @@ DeviceTime DeviceRays::State::trace(Occlusion& occlusion, OcclusionRecord sample
     time.longest_ms = std::max(time.longest_ms, of_part.longest_ms);
   }
   time.ms += spare_ms;
-  uint32_t lost = 0; // the last word of the buffer, which is not of a point
-  download(device, occlusion.results, occlusion.results.bytes() - sizeof lost,
-           std::as_writable_bytes(std::span(&lost, 1)));
-  if (lost != 0)
+  // The last word of the buffer, which is not of a point. Its memory is kept, because an allocation takes longer than
+  // the copy.
+  if (lost.bytes() == 0) lost = Buffer(device, sizeof(uint32_t), BufferPlace::kHost, "a flag");
+  device->copy(occlusion.results, lost, occlusion.results.bytes() - sizeof(uint32_t), 0, sizeof(uint32_t));
+  if (*lost.as<uint32_t>() != 0)
     throw Error(ErrorKind::kUnsupported,
                 "backend gpu: " + device->name() + " ended a kernel before all rays were traced; use --backend packed");
   return time;

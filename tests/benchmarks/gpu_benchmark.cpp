@@ -262,11 +262,12 @@ private:
     const std::vector<RayHit> expected = traced<RayHit>(as_rays(from), [&](auto in, auto out) {
       tracer_.packed().closest_hits(in, kOcclusionRays, RayOrder::kIncoherent, out);
     });
+    const double tolerance = cache_ ? 1e-3 : 0.0; // the driver's hits are nearly those
     uint64_t rays = 0, other = 0;
     for (size_t i = 0; i < from.size(); ++i) {
       if (!(from[i].tfar > 0.0f)) continue;
       const float way = expected[i].valid() ? std::min(expected[i].t * record.inverse_radius, 1.0f) : 1.0f;
-      ++rays, other += sums[2 * i + 1] == double{way} ? 0 : 1;
+      ++rays, other += std::abs(sums[2 * i + 1] - double{way}) <= tolerance ? 0 : 1;
     }
     different_ += other;
     return {{"order", "net, nearest"}, {"rays", rays}, {"different", other}};

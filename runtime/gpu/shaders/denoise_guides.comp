@@ -16,9 +16,8 @@ const int kSide = 5, kBelow = 5;                    // surfaces outside it that 
 const int kStride = kWide + 2 * kSide, kRows = kHigh + 1 + kBelow;
 const int kLoneStride = kWide + 8, kLoneRows = kHigh + 4;
 
-// dx, dy: change of the disparity per pixel.
+// dx, dy: change of the disparity per pixel. Normals are read from the cache, for the sake of shared memory.
 shared float s_disparity[kRows * kStride], s_dx[kRows * kStride], s_dy[kRows * kStride];
-shared uvec2 s_normal[kRows * kStride];      // words of the guides
 shared uint s_near[kRows * kStride];         // weights of pairs one pixel apart, a byte each, not raised
 shared uint s_lone[kLoneRows * kLoneStride]; // from 4 pixels left of the group on
 
@@ -35,16 +34,18 @@ float smaller_difference(float before, float centre, float after) {
 void load_surfaces(ivec2 origin) {
   for (uint i = gl_LocalInvocationIndex; i < s_dx.length(); i += kThreads) {
     ivec2 p = origin + ivec2(int(i) % kStride - kSide, int(i) / kStride - 1);
-    uvec4 guide = inside(p) ? guides[index_of(p)] : uvec4(0u);
-    float here = uintBitsToFloat(guide.x);
+    float here = disparity_at(p);
     s_disparity[i] = here;
-    s_normal[i] = guide.yz;
     s_dx[i] = smaller_difference(disparity_at(p - ivec2(1, 0)), here, disparity_at(p + ivec2(1, 0)));
     s_dy[i] = smaller_difference(disparity_at(p - ivec2(0, 1)), here, disparity_at(p + ivec2(0, 1)));
   }
 }
 
-ivec3 normal_at(int place) { return normal_of(s_normal[place].x, s_normal[place].y); }
+// The normal at a place of which the disparity is not 0.
+ivec3 normal_at(int place, ivec2 origin) {
+  uvec4 guide = guides[index_of(origin + ivec2(place % kStride - kSide, place / kStride - 1))];
+  return normal_of(guide.y, guide.z);
+}
 
 // Guide weight of the surfaces at places p and q, q being at an offset from p.
 uint guide_weight(int p, int q, vec2 offset) {
@@ -58,7 +59,8 @@ uint guide_weight(int p, int q, vec2 offset) {
                           lesser(terms.guide_bend * abs(rise_p - rise_q), kMostBend * least) + 1e-37;
   precise float depth = greater(0.0, 1.0 - away / allowed);
   if (depth == 0.0) return uint(kMinGuide);
-  int dot = dot_of(normal_at(p), normal_at(q));
+  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh);
+  int dot = dot_of(normal_at(p, origin), normal_at(q, origin));
   precise float cosine = lesser(greater(float(dot) * kSquaredNormalUnit, 0.0), 1.0);
   cosine *= cosine;
   cosine *= cosine;
