@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <numeric>
 #include <tuple>
@@ -26,19 +27,54 @@ struct BorderEdge {
 
 uint32_t begin_of(std::span<const uint32_t> ends, uint32_t i) { return i == 0 ? 0 : ends[i - 1]; }
 
-/// Finds the border edges of clusters, one cluster per append().
+constexpr uint32_t kBatch = 64; // clusters per task
+
+/// Calls visit(first, end) for ranges of clusters, in parallel.
+template <typename Visit>
+void for_each_batch(const ClusterRuns& clusters, const Visit& visit) {
+  const auto count = static_cast<uint32_t>(clusters.ends.size());
+  tbb::parallel_for(0u, (count + kBatch - 1) / kBatch,
+                    [&](uint32_t batch) { visit(batch * kBatch, std::min(count, (batch + 1) * kBatch)); });
+}
+
+/// Returns, per position, 1 if several clusters use it.
+std::vector<uint8_t> find_shared(const ClusterRuns& clusters) {
+  uint32_t last = 0;
+  for (const Triangle& t : clusters.points) last = std::max({last, t.x, t.y, t.z});
+  std::vector<uint32_t> owner(size_t{last} + 1, kUnassigned);
+  std::vector<uint8_t> shared(owner.size());
+  for_each_batch(clusters, [&](uint32_t first, uint32_t end) {
+    for (uint32_t cluster = first; cluster < end; ++cluster)
+      for (uint32_t i = begin_of(clusters.ends, cluster); i < clusters.ends[cluster]; ++i)
+        for (int k = 0; k < 3; ++k) {
+          const uint32_t position = clusters.points[i][k];
+          std::atomic_ref<uint32_t> known(owner[position]);
+          uint32_t expected = known.load(std::memory_order_relaxed);
+          if (expected == kUnassigned) known.compare_exchange_strong(expected, cluster, std::memory_order_relaxed);
+          if (expected != cluster && expected != kUnassigned)
+            std::atomic_ref<uint8_t>(shared[position]).store(1, std::memory_order_relaxed);
+        }
+  });
+  return shared;
+}
+
+/// Finds the border edges of clusters that other clusters may share, one cluster per append().
 class BorderFinder {
 public:
-  explicit BorderFinder(const ClusterRuns& clusters) : clusters_(clusters) {}
+  /// @param shared from find_shared()
+  BorderFinder(const ClusterRuns& clusters, const std::vector<uint8_t>& shared)
+      : clusters_(clusters), shared_(shared) {}
 
   void append(uint32_t cluster, std::vector<BorderEdge>& out) {
     const uint32_t begin = begin_of(clusters_.ends, cluster), end = clusters_.ends[cluster];
-    const size_t room = std::bit_ceil(6 * size_t{end - begin} + 2);
+    const size_t room = std::bit_ceil(6 * size_t{end - begin} + 2); // for all sides, if each is shared
     if (slots_.size() < room) slots_.assign(room, {});
     found_.clear();
     for (uint32_t i = begin; i < end; ++i) {
       const Triangle& t = clusters_.points[i];
-      for (int k = 0; k < 3; ++k) add(t[k], t[k == 2 ? 0 : k + 1], cluster);
+      if (shared_[t.x] + shared_[t.y] + shared_[t.z] < 2) continue;
+      for (int k = 0; k < 3; ++k)
+        if (const uint32_t p = t[k], q = t[k == 2 ? 0 : k + 1]; shared_[p] + shared_[q] == 2) add(p, q, cluster);
     }
     for (const uint32_t slot : found_)
       if (const Edge& e = slots_[slot]; e.once) out.push_back({e.a, e.b, cluster});
@@ -65,18 +101,17 @@ private:
   }
 
   const ClusterRuns& clusters_;
+  const std::vector<uint8_t>& shared_;
   std::vector<Edge> slots_;
   std::vector<uint32_t> found_; ///< slots of the current cluster
 };
 
 std::vector<BorderEdge> border_edges(const ClusterRuns& clusters) {
-  constexpr size_t kBatch = 64;
-  const size_t count = clusters.ends.size(), batches = (count + kBatch - 1) / kBatch;
-  std::vector<std::vector<BorderEdge>> found(batches);
-  tbb::parallel_for(size_t{0}, batches, [&](size_t batch) {
-    BorderFinder finder(clusters);
-    for (size_t i = batch * kBatch; i < std::min(count, (batch + 1) * kBatch); ++i)
-      finder.append(static_cast<uint32_t>(i), found[batch]);
+  const std::vector<uint8_t> shared = find_shared(clusters);
+  std::vector<std::vector<BorderEdge>> found((clusters.ends.size() + kBatch - 1) / kBatch);
+  for_each_batch(clusters, [&](uint32_t first, uint32_t end) {
+    BorderFinder finder(clusters, shared);
+    for (uint32_t i = first; i < end; ++i) finder.append(i, found[first / kBatch]);
   });
   std::vector<BorderEdge> edges;
   for (const auto& part : found) edges.insert(edges.end(), part.begin(), part.end());

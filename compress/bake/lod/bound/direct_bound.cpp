@@ -112,10 +112,12 @@ private:
   }
 
   void fill_heap() {
-    for (uint32_t t = 0; t < in_.triangles.size(); ++t) heap_.emplace_back(links_.bounds[t], t);
+    const auto add = [&](double stated, uint32_t number) {
+      if (stated > limit()) heap_.emplace_back(stated, number);
+    };
+    for (uint32_t t = 0; t < in_.triangles.size(); ++t) add(links_.bounds[t], t);
     for (uint32_t s = 0; s < m_.triangles.size(); ++s)
-      heap_.emplace_back(m_.triangles[s].error, static_cast<uint32_t>(in_.triangles.size()) + s);
-    std::erase_if(heap_, [&](const auto& entry) { return entry.first <= limit(); });
+      add(m_.triangles[s].error, static_cast<uint32_t>(in_.triangles.size()) + s);
     std::make_heap(heap_.begin(), heap_.end());
   }
 

@@ -33,6 +33,16 @@ struct Claim {
   bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : index > o.index; }
 };
 
+/// @param count number of simplified triangles
+LinkLists link_lists(std::span<const SurfaceLink> links, size_t count) {
+  LinkLists lists{std::vector<uint32_t>(count + 1), std::vector<uint32_t>(links.size())};
+  for (const SurfaceLink& link : links) ++lists.ends[link.simplified + 1];
+  std::partial_sum(lists.ends.begin(), lists.ends.end(), lists.ends.begin());
+  std::vector<uint32_t> next(lists.ends.begin(), lists.ends.end() - 1);
+  for (const SurfaceLink& link : links) lists.source[next[link.simplified]++] = link.source;
+  return lists;
+}
+
 /// Implements bound_errors() for one group.
 class Measurer {
 public:
@@ -277,19 +287,12 @@ private:
   /// Measures simplified triangles that images are not known to cover against the source surface.
   void measure_uncovered() {
     find_covered();
-    std::vector<SurfaceLink> found;
-    for (const SurfaceLink& link : links_)
-      if (!cover_.whole(link.simplified)) found.push_back(link);
-    std::stable_sort(found.begin(), found.end(),
-                     [](const SurfaceLink& a, const SurfaceLink& b) { return a.simplified < b.simplified; });
     UncoveredBound uncovered(source_, simplified_, error_, refiner_);
-    std::vector<uint32_t> befores;
-    size_t i = 0;
+    LinkLists linked; // set up on first use
     for (uint32_t s = 0; s < errors_.size(); ++s) {
       if (cover_.whole(s)) continue;
-      source_.link();
-      for (befores.clear(); i < found.size() && found[i].simplified == s; ++i) befores.push_back(found[i].source);
-      uncovered.measure(s, befores);
+      if (linked.ends.empty()) linked = link_lists(links_, errors_.size()), source_.link();
+      uncovered.measure(s, std::span(linked.source).subspan(linked.ends[s], linked.ends[s + 1] - linked.ends[s]));
     }
     for (const PartDistance& part : uncovered.finish()) note_after(part.simplified, part.source, part.distance);
   }
@@ -317,14 +320,7 @@ private:
 
 } // namespace
 
-LinkLists SurfaceLinks::by_after(size_t count) const {
-  LinkLists lists{std::vector<uint32_t>(count + 1), std::vector<uint32_t>(links.size())};
-  for (const SurfaceLink& link : links) ++lists.ends[link.simplified + 1];
-  std::partial_sum(lists.ends.begin(), lists.ends.end(), lists.ends.begin());
-  std::vector<uint32_t> next(lists.ends.begin(), lists.ends.end() - 1);
-  for (const SurfaceLink& link : links) lists.source[next[link.simplified]++] = link.source;
-  return lists;
-}
+LinkLists SurfaceLinks::by_after(size_t count) const { return link_lists(links, count); }
 
 SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh) {
   return Measurer(points, triangles, mesh).run();
