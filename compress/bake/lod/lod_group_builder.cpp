@@ -80,7 +80,10 @@ private:
   }
 
   void gather() {
-    Renumbering point_numbers(out_.source_triangles), wedge_numbers(out_.source_triangles);
+    Renumbering point_numbers(out_.source_triangles), vertex_numbers(out_.source_triangles),
+        wedge_numbers(out_.source_triangles);
+    std::vector<uint32_t> point_of_vertex; // by number in vertex_numbers
+    point_of_vertex.reserve(out_.source_triangles);
     mesh_.triangles.reserve(out_.source_triangles);
     for (size_t i = 0; i < in_.clusters.size(); ++i) {
       const LodCluster& c = *in_.clusters[i];
@@ -91,7 +94,10 @@ private:
         const Triangle& v = in_.levels.triangles[c.range.first_triangle + k];
         LodTriangle t{{}, Triangle(Wedge::kNone), c.range.kind, in_.levels.errors[c.range.first_triangle + k]};
         for (int corner = 0; corner < 3; ++corner) {
-          t.points[corner] = point_numbers(in_.levels.vertices[v[corner]].position);
+          const uint32_t vertex = vertex_numbers(v[corner]);
+          if (vertex == point_of_vertex.size())
+            point_of_vertex.push_back(point_numbers(in_.levels.vertices[v[corner]].position));
+          t.points[corner] = point_of_vertex[vertex];
           if (!plain) t.wedges[corner] = wedge_numbers(v[corner]);
         }
         const bool line = t.points.x == t.points.y || t.points.y == t.points.z || t.points.z == t.points.x;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "compress/bake/lod/bound/triangle_distance.h"
 
@@ -129,8 +130,8 @@ bool TriangleImages::find(uint32_t triangle, Image& out) {
   uint32_t different = 0;
   for (uint32_t i = 0; i < outline.count; ++i) {
     const uint32_t met = outline.triangles[i];
-    if (std::find(outline.triangles, outline.triangles + different, met) == outline.triangles + different)
-      outline.triangles[different++] = met;
+    outline.triangles[different] = met;
+    different += std::exchange(last_met_[met], triangle) != triangle;
   }
   out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), met_count_, different, inside};
   met_count_ += different;

@@ -25,7 +25,8 @@ public:
 
   /// Both arguments must outlive this object.
   TriangleImages(SurfaceWalk& walk, const SimplifyMesh& mesh)
-      : walk_(walk), mesh_(mesh), met_(4 * walk.source().triangles.size() + kMax) {}
+      : walk_(walk), mesh_(mesh), met_(4 * walk.source().triangles.size() + kMax),
+        last_met_(mesh.triangles.size(), kNone) {}
 
   /// Returns false, and changes nothing, if a corner or side has no image or the outline encloses more than one point.
   bool find(uint32_t triangle, Image& out);
@@ -72,7 +73,8 @@ private:
   const SimplifyMesh& mesh_;
   std::vector<uint32_t> met_; ///< with room for one more outline
   uint32_t met_count_ = 0;
-  Outline outline_; ///< of the current triangle; used by add_shares()
+  std::vector<uint32_t> last_met_; ///< per simplified triangle: the last source triangle with an image that met it
+  Outline outline_;                ///< of the current triangle; used by add_shares()
 };
 
 } // namespace packtrace
