@@ -128,12 +128,14 @@ bool Overlay::has_no_open_sides(std::span<const OverlayPiece> pieces) {
       if ((piece.inner_sides >> i & 1) == 0) continue;
       const uint32_t* points = &corners_[size_t{3} * piece.triangle];
       const uint32_t from = points[i], to = points[i == 2 ? 0 : i + 1];
-      const auto back = std::find_if(open_sides_.begin(), open_sides_.end(),
-                                     [&](const OpenSide& side) { return side.from == to && side.to == from; });
-      if (back == open_sides_.end())
-        open_sides_.push_back({from, to, piece.triangle});
+      // Looks at all sides, as that takes less time than mispredicting where the search ends.
+      const uint64_t back = OpenSide::ends_of(to, from);
+      size_t found = open_sides_.size();
+      for (size_t k = open_sides_.size(); k-- > 0;) found = open_sides_[k].ends == back ? k : found;
+      if (found == open_sides_.size())
+        open_sides_.push_back({OpenSide::ends_of(from, to), piece.triangle});
       else
-        *back = open_sides_.back(), open_sides_.pop_back();
+        open_sides_[found] = open_sides_.back(), open_sides_.pop_back();
     }
   return open_sides_.empty();
 }
@@ -161,7 +163,7 @@ bool Overlay::find_point_in(const OverlayPiece& piece, OverlayPoint& out) const 
 /// The largest distance, from an open side's candidate, of the overlaid triangle's part that is beyond the side as seen
 /// from a covered point; negative if there is none.
 double Overlay::distance_beyond(const OpenSide& side, const OverlayPoint& covered) const {
-  const OverlayPoint &p = projected_[side.from], &q = projected_[side.to];
+  const OverlayPoint &p = projected_[side.from()], &q = projected_[side.to()];
   if (!(left_of(p, q, covered) > 0.0)) return -1.0;
   OverlayPolygon part{{OverlayPoint{1.0, 0.0, 0.0, 0.0}, {0.0, 1.0, 0.0, 0.0}, {0.0, 0.0, 1.0, 0.0}}, 3};
   part = cut(part, [&](const OverlayPoint& at) { return -left_of(p, q, at); });

@@ -85,7 +85,11 @@ public:
 private:
   /// A candidate's side that crosses the triangle's interior and has no candidate on its other side.
   struct OpenSide {
-    uint32_t from, to, triangle;
+    uint64_t ends; ///< point numbers: the first one + 2^32 x the second one
+    uint32_t triangle;
+    static uint64_t ends_of(uint32_t from, uint32_t to) { return from | uint64_t{to} << 32; }
+    uint32_t from() const { return static_cast<uint32_t>(ends); }
+    uint32_t to() const { return static_cast<uint32_t>(ends >> 32); }
   };
 
   void prepare(); ///< on first use, as most overlays are never needed
