@@ -130,16 +130,19 @@ private:
   }
 
   std::vector<std::vector<uint32_t>> form_groups(const std::vector<uint32_t>& active) const {
-    std::vector<Triangle> points;
     std::vector<uint32_t> ends;
     std::vector<DVec3> centers;
+    uint32_t count = 0;
     for (const uint32_t number : active) {
-      const LodCluster& c = lod_.clusters[number];
-      for (uint32_t i = 0; i < c.range.triangle_count; ++i)
-        points.push_back(points_of(lod_.triangles[c.range.first_triangle + i]));
-      ends.push_back(static_cast<uint32_t>(points.size()));
+      ends.push_back(count += lod_.clusters[number].range.triangle_count);
       centers.push_back(cluster_spheres_[number].center);
     }
+    std::vector<Triangle> points(count);
+    tbb::parallel_for(size_t{0}, active.size(), [&](size_t i) {
+      const ClusterRange& range = lod_.clusters[active[i]].range;
+      for (uint32_t k = 0; k < range.triangle_count; ++k)
+        points[ends[i] - range.triangle_count + k] = points_of(lod_.triangles[range.first_triangle + k]);
+    });
     const std::vector<uint32_t> group_of = group_clusters({points, ends, centers});
     std::vector<std::vector<uint32_t>> members;
     for (size_t i = 0; i < active.size(); ++i) {
