@@ -48,11 +48,16 @@ float longest_motion(const RenderedImage& image) {
   return scale_end(lengths);
 }
 
+/// The depths of a layer of them; null for other layers.
+const std::vector<float>* depths_of(const RenderedImage& image, const std::string& aov) {
+  return aov == "depth" ? &image.depth : aov == "previous_depth" ? &image.previous_depth : nullptr;
+}
+
 /// Returns the picture of a layer without background.
 Image plain_preview(const RenderedImage& image, const std::string& aov) {
   if (aov == "ao") return ao_preview(image.size, image.ao);
   if (aov == "ao_raw") return ao_preview(image.size, image.ao_raw);
-  if (aov == "depth") return depth_preview(image.size, image.depth);
+  if (const std::vector<float>* depth = depths_of(image, aov)) return depth_preview(image.size, *depth);
   if (aov == "normal") return normal_preview(image.size, image.normal);
   if (aov == "instance") return id_preview(image.size, image.instance);
   if (aov == "cluster") return id_preview(image.size, image.cluster);
@@ -64,11 +69,11 @@ Image plain_preview(const RenderedImage& image, const std::string& aov) {
   return display_picture(image.size, aov == "albedo" ? image.albedo : image.shaded);
 }
 
-Legend depth_legend(const RenderedImage& image) {
-  const DepthRange range = depth_preview_range(image.depth);
+Legend depth_legend(const char* title, const std::vector<float>& depths) {
+  const DepthRange range = depth_preview_range(depths);
   const double ratio =
       range.nearest > 0.0f ? static_cast<double>(range.farthest) / static_cast<double>(range.nearest) : 1;
-  return {"depth, scene units", depth_preview_color, even_ticks([&](float t) {
+  return {title, depth_preview_color, even_ticks([&](float t) {
             return static_cast<double>(range.nearest) * std::pow(ratio, static_cast<double>(t));
           })};
 }
@@ -114,7 +119,6 @@ Legend flags_legend(const RenderedImage& image) {
 Legend view_legend(const std::string& aov, const std::vector<float>& values) {
   static const std::map<std::string, const char*> kTitles{
       {"hit_distance", "mean distance of hits, scene units"},
-      {"previous_depth", "depth in the previous picture, scene units"},
       {"local_variance", "variance of the samples in 7 x 7 pixels"},
       {"variance", "variance of the mean occlusion"},
       {"history", "history, frames"},
@@ -152,7 +156,10 @@ Image layer_preview(const RenderedImage& image, const std::string& aov, const Pr
   if (!has_cost_layer({aov}))
     preview = over_background(std::move(preview), image.coverage, style.background.value_or(usual));
   if (!style.legend) return preview;
-  if (aov == "depth") return with_legend(preview, depth_legend(image));
+  if (const std::vector<float>* depths = depths_of(image, aov))
+    return with_legend(
+        preview,
+        depth_legend(aov == "depth" ? "depth, scene units" : "depth in the previous picture, scene units", *depths));
   if (aov == "lod") return with_legend(preview, level_legend(image));
   if (aov == "lod-error") return with_legend(preview, error_legend(image.max_lod_error_px));
   if (aov == "motion") return with_legend(preview, motion_legend(image));
