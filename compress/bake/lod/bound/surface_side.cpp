@@ -29,9 +29,10 @@ void SurfaceSide::link() {
   for_each([&](uint32_t p, uint32_t i) { fans_[next[p]++] = i; });
 }
 
-void SurfaceSide::gather(const Triangle& corners) {
+void SurfaceSide::gather(const Triangle& corners, std::span<const uint32_t> first) {
   candidates_.clear();
   ++stamp_value_;
+  for (const uint32_t t : first) add(t);
   for (int i = 0; i < 3; ++i) {
     const std::span<const uint32_t> fan = around(corners[i]);
     if (fan.size() > kLargeFan)

@@ -35,7 +35,8 @@ public:
 
   // The candidates: triangles of this side that another triangle is measured against.
   std::span<const uint32_t> candidates() const { return candidates_; }
-  void gather(const Triangle& corners); ///< Makes the triangles around three points the candidates.
+  /// Makes some triangles and those around three points the candidates, in this order.
+  void gather(const Triangle& corners, std::span<const uint32_t> first = {});
   /// Adds one candidate after gather(), unless it is there already.
   void add(uint32_t triangle) {
     if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
