@@ -74,7 +74,7 @@ struct DeviceRays::State {
   std::unique_ptr<Kernel> camera_kernel, view_kernel, surfaces_kernel, points_kernel, rays_kernel;
   std::unique_ptr<Kernel> picture_kernel, picture_points_kernel;
   Occlusion any, nearest;          ///< of count_occluded() and sum_nearest()
-  Buffer lost;                     ///< a word on the host, where a flag of a kernel is read back to
+  Buffer lost;                     ///< a word on the host that receives the flag at the end of Occlusion::results
   uint64_t placed = 0;             ///< GpuScene::State::placed of the kernels
   std::vector<uint32_t> constants; ///< GpuScene::State::constants of the kernels
   Pace camera_pace;

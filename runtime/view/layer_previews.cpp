@@ -48,7 +48,7 @@ float longest_motion(const RenderedImage& image) {
   return scale_end(lengths);
 }
 
-/// The depths of a layer of them; null for other layers.
+/// The values of a layer of depths; null for other layers.
 const std::vector<float>* depths_of(const RenderedImage& image, const std::string& aov) {
   return aov == "depth" ? &image.depth : aov == "previous_depth" ? &image.previous_depth : nullptr;
 }

@@ -5,7 +5,6 @@
 #define CLOSEST
 #include "trace.glsl"
 #include "points.glsl"
-
 #include "visibility.glsl"
 
 void main() {

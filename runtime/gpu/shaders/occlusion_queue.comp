@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Counts the occlusion rays that hit something, for each point. Rays are made here.
-// CLOSEST: sums the visibility and the distance of the nearest hits up instead, as occlusion_nearest.comp does.
+// CLOSEST: instead sums the visibility and the distance of the nearest hits, as occlusion_nearest.comp does.
 //
 // A thread walks a ray's nodes and puts the leaves it reaches into its subgroup's queue. Once that is long enough, or no
 // ray goes on, the subgroup's lanes set up a leaf each, then decode a corner each, then test a pair of ray and triangle

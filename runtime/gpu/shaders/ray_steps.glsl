@@ -122,8 +122,7 @@ bool starts_far_from_all(UnitRay u) {
   return max(max(size.x, size.y), size.z) > kFar * scene.top_max_coordinate;
 }
 
-// Prepares a ray in unit space for box tests of the tree over placements. Returns
-// false if the ray misses the tree.
+// Prepares a ray in unit space for box tests of the tree over placements. Returns false if the ray misses the tree.
 bool enter_top(UnitRay u, inout GridRay r) {
   if (starts_far_from_all(u))
     return enter(u, scene.placement_count, scene.top_max_coordinate, scene.top_pad_coordinate, kMinTopDirection, r);

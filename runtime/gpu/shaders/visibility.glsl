@@ -1,5 +1,8 @@
-// What a hit leaves of a sample's light: VisibilityCurve, the same bits. Sums of both nearest-hit kernels.
-layout(std430, binding = 10) restrict buffer Sums { double sums[]; }; // visibility, distance; at the end kLostRays
+// Sums of visibility and distance over a point's samples, and VisibilityCurve with the same bits. Both kernels of nearest
+// hits include this file.
+
+// Two values by point: visibility and distance in radii. The last value is not 0 if some ray was not traced.
+layout(std430, binding = 10) restrict buffer Sums { double sums[]; };
 
 // e^x for x in [-80, 0]
 float exp_of_negative(float x) {

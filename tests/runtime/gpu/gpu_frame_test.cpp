@@ -85,7 +85,7 @@ TEST_F(GpuFrameTest, LayersOfAMovingFrameThatAreShownLater) {
   }
 }
 
-/// The error of proxies is measured from points, which must not stay on the device then.
+/// The error of proxies is measured from points on the host, so points must not stay on the device.
 TEST_F(GpuFrameTest, Proxies) {
   BakeConfig config;
   config.proxy.use = ProxyUse::kVoxels;
