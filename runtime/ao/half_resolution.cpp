@@ -136,13 +136,12 @@ GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_
   return g;
 }
 
-/// Values of the layers of a pixel.
-using Layers = std::array<float, kUpsampledLayers>;
-
+template <size_t kLayers>
 class Upsampler {
 public:
-  Upsampler(const GBuffer& full, const HalfGBuffer& half,
-            const std::array<std::span<const float>, kUpsampledLayers>& ao)
+  using Layers = std::array<float, kLayers>; ///< values of a pixel
+
+  Upsampler(const GBuffer& full, const HalfGBuffer& half, const std::array<std::span<const float>, kLayers>& ao)
       : full_(full), half_(half), ao_(ao) {}
 
   Layers values(uint32_t x, uint32_t y) const {
@@ -152,15 +151,20 @@ public:
     const uint32_t bx = x / 2, by = y / 2;
     if (const size_t own = size_t{by} * size.width + bx; half_.pixel[own] == pixel) return at(own);
     Means near;
-    for_neighbours(size, bx, by, 1, [&](size_t i, uint32_t nx, uint32_t ny) {
-      const auto [dx, dy] = distances(x, y, i, nx, ny);
-      if (dx < 2 && dy < 2 && is_hit(half_.gbuffer, i))
-        near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), at(i));
-    });
+    // Pixels less than two pixels away lie in the pixel's block or in the nearer one of its neighbours on each axis.
+    const uint32_t x0 = bx - (x % 2 == 0 && bx > 0 ? 1 : 0), x1 = std::min(bx + x % 2, size.width - 1);
+    const uint32_t y0 = by - (y % 2 == 0 && by > 0 ? 1 : 0), y1 = std::min(by + y % 2, size.height - 1);
+    for (uint32_t ny = y0; ny <= y1; ++ny)
+      for (uint32_t nx = x0; nx <= x1; ++nx) {
+        const size_t i = size_t{ny} * size.width + nx;
+        const auto [dx, dy] = distances(x, y, i, nx, ny);
+        if (dx < 2 && dy < 2 && is_hit(half_.gbuffer, i))
+          near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), at(i));
+      }
     Layers values = near.values(kMinWeight);
     if (std::ranges::all_of(values, [](float v) { return v >= 0.0f; })) return values;
     const Layers others = values_around(x, y, pixel);
-    for (size_t layer = 0; layer < kUpsampledLayers; ++layer)
+    for (size_t layer = 0; layer < kLayers; ++layer)
       if (values[layer] < 0.0f) values[layer] = others[layer];
     return values;
   }
@@ -172,14 +176,14 @@ private:
     Means() { lo.fill(INFINITY), hi.fill(-INFINITY); }
     void add(float w, const Layers& v) {
       if (!(w > 0.0f)) return;
-      for (size_t i = 0; i < kUpsampledLayers; ++i)
+      for (size_t i = 0; i < kLayers; ++i)
         if (v[i] >= 0.0f)
           weight[i] += w, sum[i] += w * v[i], lo[i] = std::min(lo[i], v[i]), hi[i] = std::max(hi[i], v[i]);
     }
     /// kInvalidAo where the total weight is less than `least`.
     Layers values(float least) const {
       Layers v = no_values();
-      for (size_t i = 0; i < kUpsampledLayers; ++i)
+      for (size_t i = 0; i < kLayers; ++i)
         if (weight[i] >= least) v[i] = std::clamp(sum[i] / weight[i], lo[i], hi[i]); // rounding leaves the range
       return v;
     }
@@ -192,7 +196,7 @@ private:
   }
   Layers at(size_t i) const {
     Layers v;
-    for (size_t layer = 0; layer < kUpsampledLayers; ++layer) v[layer] = ao_[layer][i];
+    for (size_t layer = 0; layer < kLayers; ++layer) v[layer] = ao_[layer][i];
     return v;
   }
 
@@ -210,7 +214,7 @@ private:
     });
     Layers values = far.values(kMinWeightFar);
     const Layers others = unlike.values(std::numeric_limits<float>::min());
-    for (size_t layer = 0; layer < kUpsampledLayers; ++layer)
+    for (size_t layer = 0; layer < kLayers; ++layer)
       if (values[layer] < 0.0f) values[layer] = others[layer];
     return values;
   }
@@ -225,7 +229,7 @@ private:
 
   const GBuffer& full_;
   const HalfGBuffer& half_;
-  const std::array<std::span<const float>, kUpsampledLayers> ao_;
+  const std::array<std::span<const float>, kLayers> ao_;
 };
 
 } // namespace
@@ -243,19 +247,24 @@ HalfGBuffer halve(const GBuffer& full) {
   return half;
 }
 
-std::array<std::vector<float>, kUpsampledLayers>
-upsample_ao(const GBuffer& full, const HalfGBuffer& half,
-            const std::array<std::span<const float>, kUpsampledLayers>& layers) {
-  const Upsampler upsampler(full, half, layers);
-  std::array<std::vector<float>, kUpsampledLayers> result;
+template <size_t kLayers>
+std::array<std::vector<float>, kLayers> upsample_ao(const GBuffer& full, const HalfGBuffer& half,
+                                                    const std::array<std::span<const float>, kLayers>& layers) {
+  const Upsampler<kLayers> upsampler(full, half, layers);
+  std::array<std::vector<float>, kLayers> result;
   for (std::vector<float>& layer : result) layer.resize(full.size.pixels());
   for_each_row(full.size.height, [&](uint32_t y) {
     for (uint32_t x = 0; x < full.size.width; ++x) {
-      const Layers values = upsampler.values(x, y);
-      for (size_t i = 0; i < kUpsampledLayers; ++i) result[i][size_t{y} * full.size.width + x] = values[i];
+      const std::array<float, kLayers> values = upsampler.values(x, y);
+      for (size_t i = 0; i < kLayers; ++i) result[i][size_t{y} * full.size.width + x] = values[i];
     }
   });
   return result;
 }
+
+template std::array<std::vector<float>, 1> upsample_ao(const GBuffer&, const HalfGBuffer&,
+                                                       const std::array<std::span<const float>, 1>&);
+template std::array<std::vector<float>, 2> upsample_ao(const GBuffer&, const HalfGBuffer&,
+                                                       const std::array<std::span<const float>, 2>&);
 
 } // namespace packtrace

@@ -18,8 +18,6 @@ struct HalfGBuffer {
   std::vector<uint32_t> pixel; ///< full pixel of each half pixel
 };
 
-inline constexpr size_t kUpsampledLayers = 2; ///< denoised and raw occlusion
-
 /// Selects the pixels. A block has no surface only if all its pixels miss.
 HalfGBuffer halve(const GBuffer& full);
 
@@ -30,10 +28,11 @@ HalfGBuffer halve(const GBuffer& full);
 /// not similar to any half pixel of the 5 x 5 nearest blocks gets a mean of them all, weighted towards the least
 /// different. Source: Kopf, Cohen, Lischinski, Uyttendaele, "Joint bilateral upsampling" (2007).
 /// @param full the G-buffer that `half` was made from
+/// @tparam kLayers 1 or 2
 /// @param layers of one value per half pixel; negative ones are left out
 /// @return one value per full pixel, within the range of the values; kInvalidAo where no surface or no value is
-std::array<std::vector<float>, kUpsampledLayers>
-upsample_ao(const GBuffer& full, const HalfGBuffer& half,
-            const std::array<std::span<const float>, kUpsampledLayers>& layers);
+template <size_t kLayers>
+std::array<std::vector<float>, kLayers> upsample_ao(const GBuffer& full, const HalfGBuffer& half,
+                                                    const std::array<std::span<const float>, kLayers>& layers);
 
 } // namespace packtrace

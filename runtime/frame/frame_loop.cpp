@@ -1,8 +1,11 @@
 #include "runtime/frame/frame_loop.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "pbrt_import/base/error.h"
 #include "runtime/ao/moved_occluders.h"
@@ -271,7 +274,12 @@ void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   const std::span<const float> ao = accumulated_ao(raw_mean, report);
   if (config_.ao_resolution == AoResolution::kQuarter) {
     const Stopwatch upsampling;
-    const auto [full_ao, raw] = upsample_ao(gbuffer_, half_, {ao, raw_.ao});
+    std::array<std::vector<float>, 2> layers; // raw occlusion only where it is shown
+    if ((config_.plain_layers & kAoRawLayer) != 0)
+      layers = upsample_ao<2>(gbuffer_, half_, {ao, raw_.ao});
+    else
+      layers[0] = std::move(upsample_ao<1>(gbuffer_, half_, {ao})[0]);
+    const auto& [full_ao, raw] = layers;
     times.upsample_s += upsampling.seconds();
     const Stopwatch filtering;
     layers_.resolve(config_, gbuffer_, full_ao, raw, image);

@@ -171,7 +171,7 @@ void MeanLayers::resolve(const FrameConfig& config, const GBuffer& last, std::sp
       if (hits == 0.0f && (layers & kInstanceLayer)) image.instance[out] = s.instance;
       hits += s.hits, depth += s.depth;
       if (ao[in] >= 0.0f) ao_hits += s.hits, ao_sum += s.hits * ao[in];
-      if (raw[in] >= 0.0f) raw_hits += 1.0f, raw_sum += raw[in];
+      if ((layers & kAoRawLayer) != 0 && raw[in] >= 0.0f) raw_hits += 1.0f, raw_sum += raw[in];
       normal += s.normal, albedo += s.albedo;
       const float light = std::max(ao[in], 0.0f);
       shaded += emitters_exist_ ? Vec3(s.emitters) + (s.albedo - s.emitter_albedo) * light : s.albedo * light;

@@ -89,7 +89,7 @@ void add_quarter_resolution(Metrics& metrics, const Picture& picture) {
   const HalfGBuffer half = halve(picture.surfaces);
   std::vector<float> quarter;
   for (const uint32_t pixel : half.pixel) quarter.push_back(picture.ao.ao[pixel]);
-  const std::vector<float> upsampled = upsample_ao(picture.surfaces, half, {quarter, quarter})[0];
+  const std::vector<float> upsampled = upsample_ao<1>(picture.surfaces, half, {quarter})[0];
   std::vector<double> errors;
   for (size_t i = 0; i < upsampled.size(); ++i)
     if (picture.surfaces.instance[i] != kNoInstance)

@@ -44,7 +44,7 @@ std::vector<float> at_quarter_resolution(const Picture& picture) {
   const HalfGBuffer half = halve(picture.surfaces);
   std::vector<float> ao;
   for (const uint32_t pixel : half.pixel) ao.push_back(picture.ao[pixel]);
-  return upsample_ao(picture.surfaces, half, {ao, ao})[0];
+  return upsample_ao<1>(picture.surfaces, half, {ao})[0];
 }
 
 /// Largest difference from the full picture.
