@@ -3,21 +3,30 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <vector>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 namespace packtrace {
 
 namespace {
 
+/// Paints all pixels, on all cores.
+/// @param color function of a pixel's number that returns its colour
 template <class Function>
-Image paint(ImageSize size, size_t values, Function color) {
+Image paint(ImageSize size, size_t values, const Function& color) {
   assert(values == size.pixels());
+  constexpr size_t kPixels = 4096; // of a task
   Image image(size, 3);
-  for (size_t i = 0; i < values; ++i) {
-    const Vec3 c = glm::clamp(color(i), 0.0f, 1.0f);
-    for (int k = 0; k < 3; ++k) image.data[3 * i + static_cast<size_t>(k)] = c[k];
-  }
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, values, kPixels), [&](const tbb::blocked_range<size_t>& pixels) {
+    for (size_t i = pixels.begin(); i < pixels.end(); ++i) {
+      const Vec3 c = glm::clamp(color(i), 0.0f, 1.0f);
+      std::copy_n(&c.x, 3, image.data.begin() + static_cast<std::ptrdiff_t>(3 * i));
+    }
+  });
   return image;
 }
 

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 #include "pbrt_import/scene/material_flag_names.h"
 #include "runtime/image/false_color.h"
@@ -16,13 +18,28 @@
 namespace packtrace {
 namespace {
 
+/// Converts colours to those of a picture, on all cores.
+/// @param display function of a colour
+template <typename Display>
+Image converted(ImageSize size, const std::vector<Vec3>& colors, const Display& display) {
+  constexpr size_t kPixels = 4096; // of a task
+  Image picture(size, 3);
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, colors.size(), kPixels), [&](const tbb::blocked_range<size_t>& part) {
+    for (size_t i = part.begin(); i < part.end(); ++i) {
+      const Vec3 shown = display(colors[i]);
+      std::copy_n(&shown.x, 3, picture.data.begin() + static_cast<std::ptrdiff_t>(3 * i));
+    }
+  });
+  return picture;
+}
+
 /// Applies the sRGB transfer to linear colours.
 Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
-  Image picture(size, 3);
-  for (size_t i = 0; i < linear.size(); ++i)
-    for (int k = 0; k < 3; ++k)
-      picture.data[3 * i + static_cast<size_t>(k)] = srgb_from_linear(std::clamp(linear[i][k], 0.0f, 1.0f));
-  return picture;
+  return converted(size, linear, [](const Vec3& color) {
+    Vec3 encoded;
+    for (int k = 0; k < 3; ++k) encoded[k] = srgb_from_linear(std::clamp(color[k], 0.0f, 1.0f));
+    return encoded;
+  });
 }
 
 /// The radiance of a shaded layer; null for other layers.
@@ -33,12 +50,7 @@ const std::vector<Vec3>* radiance_of(const RenderedImage& image, const std::stri
 }
 
 Image exposed_picture(ImageSize size, const std::vector<Vec3>& radiance, const Exposure& exposure) {
-  Image picture(size, 3);
-  for (size_t i = 0; i < radiance.size(); ++i) {
-    const Vec3 display = display_of_radiance(radiance[i], exposure);
-    std::copy_n(&display.x, 3, picture.data.begin() + static_cast<std::ptrdiff_t>(3 * i));
-  }
-  return picture;
+  return converted(size, radiance, [&](const Vec3& light) { return display_of_radiance(light, exposure); });
 }
 
 float longest_motion(const RenderedImage& image) {
