@@ -208,7 +208,7 @@ TEST(LodStore, AnInterruptedBakeLeavesNoHalfMadeLevels) {
   if (sanitized()) GTEST_SKIP() << kOthersRunItsCode;
   const SceneFolder folder;
   Scene scene = mixed_lod_scene();
-  for (uint32_t i = 0; i < 6; ++i) add_shape(scene, torus_mesh(60 + 10 * i, 40), translation({4.0 * i, 9, 0}));
+  for (uint32_t i = 0; i < 6; ++i) add_shape(scene, torus_mesh(60 + 10 * i, 24), translation({4.0 * i, 9, 0}));
   BakeConfig config = config_with_levels();
   const std::vector<std::byte> whole = bake(scene, config).bytes;
   config.resume = folder.path() / "levels";

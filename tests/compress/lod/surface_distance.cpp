@@ -76,11 +76,17 @@ DistanceStats surface_distance(std::span<const DVec3> from_positions, std::span<
         glm::length(glm::cross(from_positions[t.y] - from_positions[t.x], from_positions[t.z] - from_positions[t.x]));
     total += areas[i];
   }
+  std::vector<uint8_t> is_corner(from_positions.size());
+  for (const Triangle& t : from_triangles) is_corner[t.x] = is_corner[t.y] = is_corner[t.z] = 1;
+  std::vector<double> corner_distances(from_positions.size());
+  tbb::parallel_for(size_t{0}, from_positions.size(), [&](size_t i) {
+    if (is_corner[i] != 0) corner_distances[i] = to(from_positions[i]);
+  });
   std::vector<double> max(areas.size()), weighted(areas.size());
   tbb::parallel_for(size_t{0}, areas.size(), [&](size_t i) {
     const Triangle& t = from_triangles[i];
     const DVec3 &a = from_positions[t.x], &b = from_positions[t.y], &c = from_positions[t.z];
-    double largest = std::max({to(a), to(b), to(c)});
+    double largest = std::max({corner_distances[t.x], corner_distances[t.y], corner_distances[t.z]});
     const auto count = 1 + static_cast<size_t>(total > 0.0 ? areas[i] / total * static_cast<double>(samples) : 0.0);
     double sum2 = 0.0;
     for (size_t k = 0; k < count; ++k) { // a planar lattice folded into the triangle
