@@ -111,14 +111,14 @@ DeviceTime DeviceRays::State::trace(Occlusion& occlusion, OcclusionRecord sample
   Kernel* const kernels[] = {occlusion.walk.get(), occlusion.queue.get()};
   double spare_ms = 0.0; // of dispatches that only compare kernels
   const auto run = [&](const OcclusionRecord& part, uint32_t groups) {
-    const uint64_t rays = uint64_t{part.point_count} * part.sample_count;
+    const uint64_t ray_count = uint64_t{part.point_count} * part.sample_count;
     const GpuOcclusion wanted = device->config().occlusion;
     if (kernels[1] == nullptr || wanted != GpuOcclusion::kFaster) {
       Kernel* const asked = kernels[1] == nullptr || wanted == GpuOcclusion::kWalk ? kernels[0] : kernels[1];
       return device->run(*asked, push_bytes(part), groups);
     }
-    const bool compares = faster.compares(rays) && make_spare(occlusion);
-    const size_t number = faster.choice(rays);
+    const bool compares = faster.compares(ray_count) && make_spare(occlusion);
+    const size_t number = faster.choice(ray_count);
     std::array<double, 2> ms{};
     ms[number] = device->run(*kernels[number], push_bytes(part), groups);
     if (!compares) return ms[number];
@@ -126,7 +126,7 @@ DeviceTime DeviceRays::State::trace(Occlusion& occlusion, OcclusionRecord sample
     other.bind(kFirstRayBinding + 1, occlusion.spare);
     ms[1 - number] = device->run(other, push_bytes(part), groups);
     other.bind(kFirstRayBinding + 1, occlusion.results);
-    faster.add(rays, ms);
+    faster.add(ray_count, ms);
     spare_ms += ms[1 - number];
     return ms[number];
   };

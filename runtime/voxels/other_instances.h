@@ -15,23 +15,21 @@ class OtherInstances final : public SceneSource {
 public:
   /// How an instance is left out.
   enum class Absent : uint8_t {
-    kFlat,       ///< flattened to a point: tracers of packed clusters place no tree for it
-    kNoGeometry, ///< has a further geometry without triangles, for tracers that copy triangles
+    kFlat,  ///< flattened to a point: tracers of packed clusters place no tree for it
+    kEmpty, ///< has a further geometry without triangles, for tracers that copy triangles
   };
   /// @param source must outlive this object
   /// @param left_out instances of it
   OtherInstances(const SceneSource& source, std::span<const uint32_t> left_out, Absent absent)
       : source_(source), absent_(absent), instances_(source.instances().begin(), source.instances().end()) {
     for (const uint32_t i : left_out) {
-      if (absent == Absent::kNoGeometry) instances_[i].geometry = source.geometry_count();
+      if (absent == Absent::kEmpty) instances_[i].geometry = source.geometry_count();
       for (int column = 0; column < 3 && absent == Absent::kFlat; ++column)
         instances_[i].world_from_object[column] = Vec3(0.0f);
     }
   }
 
-  uint32_t geometry_count() const override {
-    return source_.geometry_count() + (absent_ == Absent::kNoGeometry ? 1 : 0);
-  }
+  uint32_t geometry_count() const override { return source_.geometry_count() + (absent_ == Absent::kEmpty ? 1 : 0); }
   GeometryCounts counts(uint32_t g) const override { return has(g) ? source_.counts(g) : GeometryCounts{}; }
   void decode(uint32_t g, std::span<Vec3> positions, std::span<Triangle> triangles) const override {
     if (has(g)) source_.decode(g, positions, triangles);

@@ -8,7 +8,7 @@ ProxyTracer::ProxyTracer(const RayTracer& whole, const BakedFile& file, const Sc
     : proxied_(std::move(proxied)),
       voxels_(file, [this](uint32_t i) { return std::ranges::binary_search(proxied_, i); }),
       source_(source, proxied_,
-              config.backend == Backend::kEmbree ? OtherInstances::Absent::kNoGeometry : OtherInstances::Absent::kFlat),
+              config.backend == Backend::kEmbree ? OtherInstances::Absent::kEmpty : OtherInstances::Absent::kFlat),
       others_(make_tracer_beside(whole, source_, &file, config)) {}
 
 float ProxyTracer::voxel_distance(const Ray& ray) const {

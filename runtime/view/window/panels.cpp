@@ -282,16 +282,16 @@ void Panels::draw_times(const ViewSnapshot& snapshot) const {
   ImGui::End();
 }
 
-void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const WindowActions& actions) {
+void Panels::draw_views(const ViewSnapshot& snapshot, FrameThread& frames, const WindowActions& actions) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({kMargin, kMargin}, ImGuiCond_Always);
   ImGui::SetNextWindowSizeConstraints({kPanelWidth, 0.0f}, {kPanelWidth, screen.y * 0.8f});
   ImGui::SetNextWindowBgAlpha(kAlpha);
   if (ImGui::Begin("View", nullptr, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings)) {
-    draw_pane(0, shown, frames);
-    draw_split(shown, frames);
-    if (shown.split != SplitMode::kOff) draw_pane(1, shown, frames);
-    if (shown.split != SplitMode::kOff) {
+    draw_pane(0, snapshot, frames);
+    draw_split(snapshot, frames);
+    if (snapshot.split != SplitMode::kOff) draw_pane(1, snapshot, frames);
+    if (snapshot.split != SplitMode::kOff) {
       int pane = static_cast<int>(settings_pane_);
       ImGui::RadioButton("settings of the first", &pane, 0);
       ImGui::SameLine();
@@ -300,9 +300,9 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
     } else {
       settings_pane_ = 0;
     }
-    draw_settings(shown.settings[settings_pane_], settings_pane_, frames);
-    draw_contents(shown, frames);
-    auto target = static_cast<float>(shown.target_ms);
+    draw_settings(snapshot.settings[settings_pane_], settings_pane_, frames);
+    draw_contents(snapshot, frames);
+    auto target = static_cast<float>(snapshot.target_ms);
     ImGui::SetNextItemWidth(kWidgetWidth);
     if (ImGui::SliderFloat("target, ms", &target, 0.0f, 200.0f, "%.0f", ImGuiSliderFlags_AlwaysClamp))
       frames.post([target](ViewSession& session, ViewControls&) { session.set_target_ms(double{target}); });
@@ -312,10 +312,10 @@ void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const Wi
     if (ImGui::Button("Save settings")) frames.post(actions.save_settings);
     ImGui::SameLine();
     if (ImGui::Button("Help (I)")) help = !help;
-    text_line(fmt::format("speed {:.3g} units per second{}{}{}{}", shown.speed, shown.orbits ? ", orbit" : "",
-                          shown.plays ? ", plays" : "", shown.lights_turn ? ", lights turn" : "",
-                          shown.paused ? ", paused" : ""));
-    if (shown.recording) ImGui::TextColored({1.0f, 0.4f, 0.3f, 1.0f}, "recording the camera");
+    text_line(fmt::format("speed {:.3g} units per second{}{}{}{}", snapshot.speed, snapshot.orbits ? ", orbit" : "",
+                          snapshot.plays ? ", plays" : "", snapshot.lights_turn ? ", lights turn" : "",
+                          snapshot.paused ? ", paused" : ""));
+    if (snapshot.recording) ImGui::TextColored({1.0f, 0.4f, 0.3f, 1.0f}, "recording the camera");
   }
   ImGui::End();
 }
