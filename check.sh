@@ -24,7 +24,7 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
   export PACKTRACE_SCENES
 fi
 begin_stage "Debian packages"
-# Checks link some hundred programs, each with the whole product: lld takes a third of the time of GNU ld.
+# Checks link some hundred programs, each with the whole product: lld takes a third to a half of the time of GNU ld.
 # Some tests need the others: clang compiles the fuzz preset's kernels, shells and man tools check the generated files, and
 # Chromium opens the HTML report.
 bash .ci/install_packages.sh window tests benchmarks python clang-19 clang-format-19 clang-tidy-19 lld zsh fish mandoc groff-base chromium

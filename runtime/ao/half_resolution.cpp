@@ -70,13 +70,18 @@ void for_each_row(uint32_t rows, const Body& body) {
   });
 }
 
+/// Calls body(index, column, row) for the blocks of some columns and rows, bounds included, that lie in the picture.
+template <class Body>
+void for_blocks(ImageSize half, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1, const Body& body) {
+  x1 = std::min(half.width - 1, x1), y1 = std::min(half.height - 1, y1);
+  for (uint32_t y = y0; y <= y1; ++y)
+    for (uint32_t x = x0; x <= x1; ++x) body(size_t{y} * half.width + x, x, y);
+}
+
 /// Calls body(index, column, row) for the blocks within `reach` of a block, itself included.
 template <class Body>
 void for_neighbours(ImageSize half, uint32_t bx, uint32_t by, uint32_t reach, const Body& body) {
-  const uint32_t x0 = bx > reach ? bx - reach : 0, y0 = by > reach ? by - reach : 0;
-  const uint32_t x1 = std::min(half.width - 1, bx + reach), y1 = std::min(half.height - 1, by + reach);
-  for (uint32_t y = y0; y <= y1; ++y)
-    for (uint32_t x = x0; x <= x1; ++x) body(size_t{y} * half.width + x, x, y);
+  for_blocks(half, bx > reach ? bx - reach : 0, by > reach ? by - reach : 0, bx + reach, by + reach, body);
 }
 
 /// The first pixel that shows a surface, per block.
@@ -151,16 +156,14 @@ public:
     const uint32_t bx = x / 2, by = y / 2;
     if (const size_t own = size_t{by} * size.width + bx; half_.pixel[own] == pixel) return at(own);
     Means near;
-    // Pixels less than two pixels away lie in the pixel's block or in the nearer one of its neighbours on each axis.
-    const uint32_t x0 = bx - (x % 2 == 0 && bx > 0 ? 1 : 0), x1 = std::min(bx + x % 2, size.width - 1);
-    const uint32_t y0 = by - (y % 2 == 0 && by > 0 ? 1 : 0), y1 = std::min(by + y % 2, size.height - 1);
-    for (uint32_t ny = y0; ny <= y1; ++ny)
-      for (uint32_t nx = x0; nx <= x1; ++nx) {
-        const size_t i = size_t{ny} * size.width + nx;
-        const auto [dx, dy] = distances(x, y, i, nx, ny);
-        if (dx < 2 && dy < 2 && is_hit(half_.gbuffer, i))
-          near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), at(i));
-      }
+    // A half pixel less than two full pixels away belongs to the pixel's own block or to the closer neighbouring block
+    // on each axis: the one before for the first pixel of a block, the one after for the second.
+    const uint32_t x0 = bx - (x % 2 == 0 && bx > 0 ? 1 : 0), y0 = by - (y % 2 == 0 && by > 0 ? 1 : 0);
+    for_blocks(size, x0, y0, bx + x % 2, by + y % 2, [&](size_t i, uint32_t nx, uint32_t ny) {
+      const auto [dx, dy] = distances(x, y, i, nx, ny);
+      if (dx < 2 && dy < 2 && is_hit(half_.gbuffer, i))
+        near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), at(i));
+    });
     Layers values = near.values(kMinWeight);
     if (std::ranges::all_of(values, [](float v) { return v >= 0.0f; })) return values;
     const Layers others = values_around(x, y, pixel);

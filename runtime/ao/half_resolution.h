@@ -28,7 +28,7 @@ HalfGBuffer halve(const GBuffer& full);
 /// not similar to any half pixel of the 5 x 5 nearest blocks gets a mean of them all, weighted towards the least
 /// different. Source: Kopf, Cohen, Lischinski, Uyttendaele, "Joint bilateral upsampling" (2007).
 /// @param full the G-buffer that `half` was made from
-/// @tparam kLayers 1 or 2
+/// @tparam kLayers number of layers, 1 or 2
 /// @param layers of one value per half pixel; negative ones are left out
 /// @return one value per full pixel, within the range of the values; kInvalidAo where no surface or no value is
 template <size_t kLayers>

@@ -60,8 +60,8 @@ struct GBuffer {
   /// and these arrays are empty.
   bool points_may_stay_on_gpu = false;
   bool points_on_gpu = false;
-  /// It may leave view_z, normal, motion_px and previous_z there, too. Then `guides_on_gpu` is true, and these arrays
-  /// have their sizes, but their values have no meaning until read_device_guides() fills them in.
+  /// It may also leave view_z, normal, motion_px and previous_z there. Then `guides_on_gpu` is true, and these arrays
+  /// have their sizes but undefined values until read_device_guides() fills them in.
   bool guides_may_stay_on_gpu = false;
   bool guides_on_gpu = false;
 

@@ -274,7 +274,7 @@ void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   const std::span<const float> ao = accumulated_ao(raw_mean, report);
   if (config_.ao_resolution == AoResolution::kQuarter) {
     const Stopwatch upsampling;
-    std::array<std::vector<float>, 2> layers; // raw occlusion only where it is shown
+    std::array<std::vector<float>, 2> layers; // denoised, raw; the latter only if a layer shows it
     if ((config_.plain_layers & kAoRawLayer) != 0)
       layers = upsample_ao<2>(gbuffer_, half_, {ao, raw_.ao});
     else

@@ -88,7 +88,7 @@ public:
   const ShadeScene* shade_scene() const { return shading_.scene(); }
   const DetailPlanner* detail() const { return state_.planner(); }
   const AoDenoiser& denoiser() const { return denoiser_; }
-  /// Camera rays of the last frame that traced any. Reads what stayed on a GPU.
+  /// The G-buffer of the last frame that traced camera rays. Reads arrays that stayed on a GPU.
   const GBuffer& gbuffer() {
     read_surfaces();
     return gbuffer_;

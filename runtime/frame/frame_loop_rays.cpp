@@ -108,7 +108,7 @@ void FrameLoop::trace_still(const Camera& camera, uint32_t frames, bool plans) {
   }
 }
 
-/// Whether the host reads depths, normals or motion of every moving frame.
+/// Whether layers or settings need depths, normals or motion of each moving frame on the host.
 bool FrameLoop::reads_surfaces() const {
   return config_.plain_layers != 0 || config_.view_layers || config_.surface_layers || config_.cost_layers ||
          config_.lod_layers || config_.shades() || config_.supersample != 1 || config_.proxy_beyond_px ||

@@ -141,7 +141,7 @@ std::span<const Vec3> MeanLayers::albedos(const GBuffer& last, std::vector<Vec3>
   return memory;
 }
 
-/// Writes ambient occlusion and coverage of a single frame without sub-pixels.
+/// Writes ambient occlusion and coverage, for images of one frame with one traced pixel per pixel and no other layers.
 void MeanLayers::resolve_occlusion(const GBuffer& frame, std::span<const float> ao, RenderedImage& image) const {
   for_each_image_row(image.size.height, [&](uint32_t y) {
     for (size_t i = size_t{y} * image.size.width, end = i + image.size.width; i < end; ++i) {

@@ -39,9 +39,8 @@ public:
   /// Box-filters the layers into an image. LOD layers stay as they are, and layers that FrameConfig::plain_layers does
   /// not have become empty.
   /// @param last of the last add()
-  /// @param ao, raw one value per traced pixel; negative: none, which is black in RenderedImage::shaded. raw is read
-  /// only
-  ///   if FrameConfig::plain_layers has kAoRawLayer
+  /// @param ao, raw one value per traced pixel; negative: none, which is black in RenderedImage::shaded. `raw` may be
+  ///   empty unless FrameConfig::plain_layers has kAoRawLayer.
   void resolve(const FrameConfig& config, const GBuffer& last, std::span<const float> ao, std::span<const float> raw,
                RenderedImage& image) const;
 

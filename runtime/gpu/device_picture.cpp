@@ -10,6 +10,23 @@
 // The functions of DeviceRays for whole pictures.
 namespace packtrace::gpu {
 
+namespace {
+
+/// Planes [first, end) of a picture.
+struct PlaneRange {
+  uint32_t first, end;
+};
+
+/// The planes that read_surfaces() reads: depths, normals and instances, and motion and previous depths if surfaces
+/// moved.
+PlaneRange surface_planes(bool moved) { return {kViewZPlane, moved ? kPositionPlane : kMotionPlane}; }
+
+uint64_t plane_bytes(const DeviceView& picture, uint32_t planes) {
+  return uint64_t{planes} * sizeof(uint32_t) * picture.pixels();
+}
+
+} // namespace
+
 /// Writes the camera that kernels read.
 void DeviceRays::State::write_view(Commands& commands, const View& from) {
   if (view.bytes() == 0) view = StagedBuffer(device, sizeof from.record, "the camera");
@@ -55,19 +72,6 @@ void DeviceRays::set_surfaces(std::span<const InstanceSurface> instances, std::s
 }
 
 uint64_t DeviceRays::surface_bytes() const { return state_->instances.bytes() + state_->lookup.bytes(); }
-
-namespace {
-/// Planes that are read back together.
-struct PlaneRange {
-  uint32_t first, end;
-};
-/// Depths, normals, instances, and motion with previous depths where surfaces moved.
-PlaneRange surface_planes(bool moved) { return {kViewZPlane, moved ? kPositionPlane : kMotionPlane}; }
-
-uint64_t plane_bytes(const DeviceView& picture, uint32_t planes) {
-  return uint64_t{planes} * sizeof(uint32_t) * picture.pixels();
-}
-} // namespace
 
 void DeviceRays::make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces,
                                bool only_instances) {
@@ -145,7 +149,7 @@ void DeviceRays::write_picture(DeviceAo& picture, uint32_t sample_count, bool ne
   if (!s.picture_kernel)
     s.picture_kernel = std::make_unique<Kernel>(s.device, spirv::occlusion_image(), std::span<const uint32_t>(), 4,
                                                 static_cast<uint32_t>(sizeof(OcclusionImageRecord)));
-  const Buffer& results = nearest ? s.nearest.results : s.any.results; // for both bindings, of which one is read
+  const Buffer& results = nearest ? s.nearest.results : s.any.results; // bound twice; the kernel reads one binding
   const Buffer* const buffers[] = {&s.points.device(), &results, &results, &picture.values()};
   for (uint32_t i = 0; i < std::size(buffers); ++i) s.picture_kernel->bind(i, *buffers[i]);
   const OcclusionImageRecord record{

@@ -101,9 +101,9 @@ void DeviceRays::State::make_kernels(Occlusion& occlusion, const RayKernelCode& 
   }
 }
 
-/// Traces the rays of all points, with the kernel that is faster.
-/// @param max_samples of a point in a dispatch
-/// @param split_samples whether several threads, with samples.per_thread samples each, may share a point
+/// Traces the occlusion rays of all points with the faster one of the two kernels.
+/// @param max_samples number of samples per point that one dispatch may trace
+/// @param split_samples whether several threads may trace a point, samples.per_thread samples each
 DeviceTime DeviceRays::State::trace(Occlusion& occlusion, OcclusionRecord samples, uint32_t max_samples,
                                     bool split_samples, const Watch& watch) {
   device->fill(occlusion.results, 0);
@@ -136,7 +136,7 @@ DeviceTime DeviceRays::State::trace(Occlusion& occlusion, OcclusionRecord sample
     samples.first_sample = first_sample + done;
     samples.sample_count = std::min(sample_count - done, max_samples);
     if (!split_samples) samples.per_thread = samples.sample_count;
-    const uint32_t threads = (samples.sample_count + samples.per_thread - 1) / samples.per_thread; // of a point
+    const uint32_t threads = (samples.sample_count + samples.per_thread - 1) / samples.per_thread; // per point
     const Watch watch_part = [&](double share) {
       if (watch) watch((done + share * samples.sample_count) / sample_count);
     };
@@ -150,8 +150,7 @@ DeviceTime DeviceRays::State::trace(Occlusion& occlusion, OcclusionRecord sample
     time.longest_ms = std::max(time.longest_ms, of_part.longest_ms);
   }
   time.ms += spare_ms;
-  // The last word of the buffer, which is not of a point. Its memory is kept, because an allocation takes longer than
-  // the copy.
+  // The flag is the last word of the results. The host buffer is kept, because allocating it takes longer than copying.
   if (lost.bytes() == 0) lost = Buffer(device, sizeof(uint32_t), BufferPlace::kHost, "a flag");
   device->copy(occlusion.results, lost, occlusion.results.bytes() - sizeof(uint32_t), 0, sizeof(uint32_t));
   if (*lost.as<uint32_t>() != 0)

@@ -56,9 +56,9 @@ public:
   void set_surfaces(std::span<const InstanceSurface> instances, std::span<const uint32_t> lookup);
   /// Makes the planes of a picture that trace_view() traced. Needs set_surfaces(). Throws as Buffer does.
   /// @param view the picture's
-  /// @param only_instances read only this plane back; otherwise all that read_surfaces() reads
+  /// @param only_instances whether only the plane of instances is read back, rather than all that read_surfaces() reads
   void make_surfaces(DeviceView& picture, const View& view, const SurfaceViewRecord& surfaces, bool only_instances);
-  /// Reads depths, normals and instances back, and motion and previous depths if they have a meaning.
+  /// Reads depths, normals and instances back, and motion and previous depths if DeviceView::has_motion().
   void read_surfaces(const DeviceView& picture) const;
   /// Reads the planes of the points back.
   void read_points(const DeviceView& picture) const;

@@ -50,12 +50,12 @@ void with_slack(uint64_t bytes, const Allocate& allocate) {
   }
 }
 
-/// Two kernels with the same results that trace the occlusion rays of all points, and their results.
+/// Two interchangeable kernels that trace the occlusion rays of all points, and the buffers that they write.
 struct Occlusion {
   std::unique_ptr<Kernel> walk, queue; ///< queue: null where it cannot run
-  Buffer results;                      ///< by point; at the end a word that is not 0 if some ray was not traced
-  Buffer spare;                        ///< results of dispatches that only compare the kernels
-  FasterKernel faster[kSampleOrders];  ///< by the order of samples
+  Buffer results;                      ///< one per point; the last word is a flag: not 0 if a ray was not traced
+  Buffer spare;                        ///< receives the results of the slower kernel when both are timed
+  FasterKernel faster[kSampleOrders];  ///< one per order of samples
   Pace pace[kSampleOrders];
 };
 
@@ -74,7 +74,7 @@ struct DeviceRays::State {
   std::unique_ptr<Kernel> camera_kernel, view_kernel, surfaces_kernel, points_kernel, rays_kernel;
   std::unique_ptr<Kernel> picture_kernel, picture_points_kernel;
   Occlusion any, nearest;          ///< of count_occluded() and sum_nearest()
-  Buffer lost;                     ///< a word on the host that receives the flag at the end of Occlusion::results
+  Buffer lost;                     ///< on the host: receives the flag of Occlusion::results
   uint64_t placed = 0;             ///< GpuScene::State::placed of the kernels
   std::vector<uint32_t> constants; ///< GpuScene::State::constants of the kernels
   Pace camera_pace;
@@ -105,7 +105,8 @@ struct DeviceRays::State {
     return uint64_t{device->limits().maxComputeWorkGroupCount[0]} * Kernel::kGroupThreads;
   }
   bool has_queue() const;
-  /// @param walk, queue code of the kernels, which are made unless they are there
+  /// Creates the kernels that do not exist yet, and binds the points and the results.
+  /// @param walk, queue shader code
   void make_kernels(Occlusion& occlusion, const RayKernelCode& walk, std::span<const uint32_t> queue);
   DeviceTime trace(Occlusion& occlusion, OcclusionRecord samples, uint32_t max_samples, bool split_samples,
                    const Watch& watch);

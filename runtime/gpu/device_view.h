@@ -27,7 +27,8 @@ public:
   const StagedBuffer& planes() const { return planes_; }
   /// Whether the planes are those of the hits.
   bool has_surfaces() const { return has_surfaces_; }
-  /// Whether their surfaces moved in the picture since the last one: else the planes of motion have no meaning.
+  /// Whether surfaces moved in the picture since the previous one. Otherwise the planes of motion and previous depths
+  /// are undefined.
   bool has_motion() const { return has_motion_; }
   void set_surfaces(bool made, bool moved) { has_surfaces_ = made, has_motion_ = moved; }
   /// A plane that was read back.

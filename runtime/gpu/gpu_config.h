@@ -17,7 +17,7 @@ enum class GpuStructures : uint8_t {
   kDriver, ///< acceleration structures of the Vulkan driver over decoded triangles
 };
 
-/// Which kernel traces occlusion rays through packed nodes; results are the same.
+/// Which of two kernels with the same results traces occlusion rays through packed nodes.
 enum class GpuOcclusion : uint8_t {
   kFaster, ///< the one that took less time of late
   kWalk,   ///< occlusion_count.comp and occlusion_nearest.comp

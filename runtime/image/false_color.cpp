@@ -3,31 +3,20 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstddef>
 #include <numbers>
 #include <vector>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
+#include "runtime/image/painted.h"
 
 namespace packtrace {
 
 namespace {
 
-/// Paints all pixels, on all cores.
-/// @param color function of a pixel's number that returns its colour
+/// painted() with colours clamped to [0,1].
 template <class Function>
-Image paint(ImageSize size, size_t values, const Function& color) {
+Image paint(ImageSize size, [[maybe_unused]] size_t values, const Function& color) {
   assert(values == size.pixels());
-  constexpr size_t kPixels = 4096; // of a task
-  Image image(size, 3);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, values, kPixels), [&](const tbb::blocked_range<size_t>& pixels) {
-    for (size_t i = pixels.begin(); i < pixels.end(); ++i) {
-      const Vec3 c = glm::clamp(color(i), 0.0f, 1.0f);
-      std::copy_n(&c.x, 3, image.data.begin() + static_cast<std::ptrdiff_t>(3 * i));
-    }
-  });
-  return image;
+  return painted(size, [&](size_t i) { return glm::clamp(Vec3(color(i)), 0.0f, 1.0f); });
 }
 
 bool has_depth(float depth) { return depth > 0.0f && std::isfinite(depth); }

@@ -54,7 +54,7 @@ struct SurfacePlanes {
 };
 struct PointPlanes {
   std::span<const Vec3> position, geometric_normal;
-  std::span<const Vec3> normal; ///< may be empty
+  std::span<const Vec3> normal; ///< shading normals; empty unless they were asked for
   std::span<const float> offset;
 };
 
@@ -103,11 +103,11 @@ public:
   /// @param now the picture's camera
   /// @param previous not an environment camera; motion is that of surfaces at rest since this camera
   /// @param no_motion_px kNoMotionPx
-  /// @param only_instances whether the other planes stay on the device until read_surfaces(), and are empty here
+  /// @param only_instances read only the instances; the other spans are empty, and their planes stay on the device
   virtual std::optional<SurfacePlanes> make_surfaces(gpu::DeviceView& picture, const PrimaryCamera& now,
                                                      const PrimaryCamera& previous, double no_motion_px,
                                                      bool only_instances) const = 0;
-  /// Reads all planes of such surfaces.
+  /// Reads the planes that make_surfaces() left on the device.
   virtual SurfacePlanes read_surfaces(const gpu::DeviceView& picture) const = 0;
   /// Reads the points of such surfaces.
   virtual PointPlanes read_points(const gpu::DeviceView& picture, bool with_normals) const = 0;

@@ -7,37 +7,21 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "pbrt_import/scene/material_flag_names.h"
 #include "runtime/image/false_color.h"
 #include "runtime/image/legend.h"
+#include "runtime/image/painted.h"
 #include "runtime/view/layers.h"
 
 namespace packtrace {
 namespace {
 
-/// Converts colours to those of a picture, on all cores.
-/// @param display function of a colour
-template <typename Display>
-Image converted(ImageSize size, const std::vector<Vec3>& colors, const Display& display) {
-  constexpr size_t kPixels = 4096; // of a task
-  Image picture(size, 3);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, colors.size(), kPixels), [&](const tbb::blocked_range<size_t>& part) {
-    for (size_t i = part.begin(); i < part.end(); ++i) {
-      const Vec3 shown = display(colors[i]);
-      std::copy_n(&shown.x, 3, picture.data.begin() + static_cast<std::ptrdiff_t>(3 * i));
-    }
-  });
-  return picture;
-}
-
 /// Applies the sRGB transfer to linear colours.
 Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
-  return converted(size, linear, [](const Vec3& color) {
+  return painted(size, [&](size_t i) {
     Vec3 encoded;
-    for (int k = 0; k < 3; ++k) encoded[k] = srgb_from_linear(std::clamp(color[k], 0.0f, 1.0f));
+    for (int k = 0; k < 3; ++k) encoded[k] = srgb_from_linear(std::clamp(linear[i][k], 0.0f, 1.0f));
     return encoded;
   });
 }
@@ -50,7 +34,7 @@ const std::vector<Vec3>* radiance_of(const RenderedImage& image, const std::stri
 }
 
 Image exposed_picture(ImageSize size, const std::vector<Vec3>& radiance, const Exposure& exposure) {
-  return converted(size, radiance, [&](const Vec3& light) { return display_of_radiance(light, exposure); });
+  return painted(size, [&](size_t i) { return display_of_radiance(radiance[i], exposure); });
 }
 
 float longest_motion(const RenderedImage& image) {

@@ -242,7 +242,7 @@ private:
             {"longest_dispatch_ms", time.longest_ms}};
   }
 
-  /// Nearest hits with the order of samples of pictures.
+  /// Times nearest hits, with samples in the order that pictures use.
   Json run_nearest(uint32_t spp) {
     const gpu::OcclusionRecord record = occlusion_record(gpu::kNetOrder, 0, spp);
     std::vector<double> ms;
@@ -251,7 +251,7 @@ private:
     return {{"spp", spp}, {"ms", median(ms)}, {"mrays_s", double(points_hit_) * spp / median(ms) * 1e-3}};
   }
 
-  /// Compares the nearest hits of a sample of all points with packed's.
+  /// Compares the nearest hits of one sample per point with those of backend packed.
   Json compare_nearest() {
     const gpu::OcclusionRecord record = occlusion_record(gpu::kNetOrder, 5, 1);
     std::vector<packed::KernelRay> from(rays_.point_count());
@@ -262,7 +262,7 @@ private:
     const std::vector<RayHit> expected = traced<RayHit>(as_rays(from), [&](auto in, auto out) {
       tracer_.packed().closest_hits(in, kOcclusionRays, RayOrder::kIncoherent, out);
     });
-    const double tolerance = cache_ ? 1e-3 : 0.0; // the driver's hits are nearly those
+    const double tolerance = cache_ ? 1e-3 : 0.0; // the driver's structures give nearly the same distances
     uint64_t rays = 0, other = 0;
     for (size_t i = 0; i < from.size(); ++i) {
       if (!(from[i].tfar > 0.0f)) continue;

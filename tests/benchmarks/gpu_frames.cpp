@@ -152,7 +152,7 @@ Json measure_gpu_frames(const BakedFile& file, const PackedSource& source, const
   for (uint32_t f = 0; f < kCompared; ++f) compare(moved(camera, step * f), of_moving);
   loop.reset(), packed.reset(); // so that still frames begin anew in both
   for (uint32_t f = 0; f < kCompared; ++f) compare(camera, of_still);
-  // The device's clock is low until it was busy for a while, as it is beside a window.
+  // Warms the device up: its clock is low until it has been busy for a while, as it is while a window is open.
   uint32_t f = 0;
   for (const Stopwatch warming; f < 3 || warming.seconds() < 1.0; ++f) next(loop, moved(camera, step * f), image);
   const auto measure = [&](const Camera& view, Times& times) {

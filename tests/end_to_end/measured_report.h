@@ -13,7 +13,7 @@ struct MeasuredReport {
   bool work_left = false; ///< the folder of baked files was there after the first run
 };
 
-/// The same one in each call.
+/// Returns the same report in every call.
 const MeasuredReport& measured_report();
 
 } // namespace packtrace::test

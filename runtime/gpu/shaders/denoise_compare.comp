@@ -18,6 +18,7 @@ void main() {
   for (uint i = gl_GlobalInvocationID.x; i < pixel_count() && changes[0] == 0u; i += stride) {
     vec3 normal = vec3(normals[3u * i], normals[3u * i + 1u], normals[3u * i + 2u]);
     if (is_still(motions[i]) && guide_of(view_z[i], normal, instances[i]) == guides_before[i]) continue;
-    if (subgroupElect()) changes[0] = changes[1] = 1u; // threads that write the same word wait for each other
+    // One thread per subgroup, because writes to the same word are serialised.
+    if (subgroupElect()) changes[0] = changes[1] = 1u;
   }
 }

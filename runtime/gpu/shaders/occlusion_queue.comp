@@ -35,7 +35,7 @@ layout(local_size_x = 64) in;
 shared uint s_queue[kGroup * kPlaces];     // node << 8 | lane << 3 | slot
 shared uint s_corner[kGroup * kCorners * 3]; // floats; before there are any: which lane has a leaf
 #ifdef CLOSEST
-shared uint s_nearest[kGroup]; // by thread: ordered() t of the nearest hit that the last tests found
+shared uint s_nearest[kGroup]; // by thread: ordered() t of the nearest hit of the current flush
 const uint kNoHit = 0xffffffffu;
 #else
 shared uint s_hit[kGroup / 4u]; // by subgroup: bits of the rays that hit something
@@ -74,7 +74,7 @@ Corner shared_corner(GridRay p, uint at) { // at: of the first float
 }
 
 #ifdef CLOSEST
-// Floats as words in the same order.
+// Maps a float to an unsigned integer so that the order is kept.
 uint ordered(float t) {
   uint bits = floatBitsToUint(t);
   return bits ^ ((bits & 0x80000000u) != 0u ? 0xffffffffu : 0x80000000u);
@@ -83,10 +83,10 @@ float from_ordered(uint word) {
   return uintBitsToFloat(word ^ ((word & 0x80000000u) != 0u ? 0x80000000u : 0xffffffffu));
 }
 
-// Ends the ray at the nearest hit of the last tests, if that is nearer than all before. Returns whether it is.
+// Shortens the ray to the nearest hit of a flush. Returns false if there is none, or an earlier hit is nearer.
 bool take_nearest(uint word, inout UnitRay u, Way way, inout GridRay r) {
   if (word == kNoHit) return false;
-  precise double unit = (double(from_ordered(word)) + r.t_begin) * r.t_scale; // grows with t
+  precise double unit = (double(from_ordered(word)) + r.t_begin) * r.t_scale; // monotonic in t
   float unit_t = float(unit);
   if (unit_t > u.tmax) return false;
   u.tmax = unit_t;
@@ -267,7 +267,7 @@ void main() {
       uint ending = subgroupAny(walking) && count >= S ? count - count % S : count;
       for (uint e = 0u; e < ending; e += S) flush_leaves(r, way.tree_flags, e, count);
       uint rest = count - ending, entry = 0u;
-      bool mine = false, stays = LANE < rest; // mine: the ray needs no more tests
+      bool mine = false, stays = LANE < rest; // mine: the lane's ray is done; stays: its queue entry is still needed
       if (stays) entry = s_queue[queue0 + ending + LANE];
 #ifdef CLOSEST
       if (pending) {

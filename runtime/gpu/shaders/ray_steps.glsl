@@ -5,8 +5,8 @@
 const uint kNoPlacement = 0xffffffffu;
 const uint kRootParent = 0xffffffffu; // of the root of the tree over placements
 
-// With many placements: rays as triangle tests need them, by word, then by thread: origin, shear, begin, end, major, and
-// for nearest hits rest.
+// With many placements: rays as triangle tests need them, by word, then by thread: origin, shear, begin, end, major; for
+// nearest hits, also rest.
 #ifdef CLOSEST
 const uint kTestWords = kManyPlacements ? 12u * kGroup : 1u;
 #else
@@ -133,7 +133,7 @@ bool enter_top(UnitRay u, inout GridRay r) {
 }
 
 #ifdef CLOSEST
-// Shortens box tests of the ray to u.tmax, in the grid of the placement where its last hit lies and above.
+// Ends box tests of the ray at u.tmax, in the grid of the current placement and in the tree over placements.
 void shorten(UnitRay u, Way way, inout GridRay r) {
   float end = grid_t(r, u.tmax);
   if (!kManyPlacements) {
@@ -142,7 +142,7 @@ void shorten(UnitRay u, Way way, inout GridRay r) {
   }
   uint at = gl_SubgroupID * S + LANE;
   s_test[7u * kGroup + at] = floatBitsToUint(end);
-  bool far = starts_far_from_all(u); // such rays keep their end above
+  bool far = starts_far_from_all(u); // their end in the tree over placements is not updated, which is conservative
   if (!far) s_top[10u * kGroup + at] = u.tmax;
   if (way.in_tree)
     r.end = end;

@@ -45,7 +45,8 @@ dvec3 facing_normal(dvec3 normal, dvec3 direction) {
 
 // Where the ray meets the surface's plane, if that is close to the point of the barycentrics; else that point.
 dvec3 on_ray(dvec3 origin, dvec3 direction, dvec3 from_barycentrics, dvec3 normal) {
-  const double kMinCosine = 1e-3lf, kMaxMove = 1.0lf; // 2^-20 of the unit space's half size
+  const double kMinCosine = 1e-3lf;
+  const double kMaxMove = 1.0lf; // in unit space, whose half size is 2^20
   double cosine = product(normal, direction);
   precise dvec3 way = from_barycentrics - origin;
   double t = refined_quotient(product(normal, way), cosine);

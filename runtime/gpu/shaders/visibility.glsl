@@ -1,7 +1,7 @@
-// Sums of visibility and distance over a point's samples, and VisibilityCurve with the same bits. Both kernels of nearest
-// hits include this file.
+// Sums over the samples of a point, for both kernels that trace nearest hits: add_samples() and VisibilityCurve of the CPU,
+// with the same bits.
 
-// Two values by point: visibility and distance in radii. The last value is not 0 if some ray was not traced.
+// Two values per point: visibility, and distance in radii. The last value is a flag: not 0 if a ray was not traced.
 layout(std430, binding = 10) restrict buffer Sums { double sums[]; };
 
 // e^x for x in [-80, 0]
@@ -36,7 +36,7 @@ float visibility(float x) {
 }
 
 // Adds a sample to the sums of a point.
-// t: of the nearest hit; ignored unless `hit`
+// t: distance of the nearest hit, ignored unless `hit`
 void add_sample(uint point, bool hit, float t) {
   float k = 1.0, way = 1.0;
   if (hit) {

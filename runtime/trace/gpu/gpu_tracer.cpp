@@ -55,7 +55,7 @@ gpu::DeviceRays::View view_of(const PrimaryCamera& camera, const UnitSpace& spac
   return view;
 }
 
-/// Planes that were read back.
+/// The planes of DeviceRays::read_surfaces().
 SurfacePlanes surface_planes(const gpu::DeviceView& picture) {
   SurfacePlanes planes{picture.plane<float>(gpu::kViewZPlane),
                        picture.plane<Vec3>(gpu::kNormalPlane),

@@ -114,9 +114,9 @@ protected:
   }
 
   void expect_same(const test::BakedScene& baked, uint32_t width, uint32_t height) {
-    for (const GpuOcclusion counting : {GpuOcclusion::kQueue, GpuOcclusion::kWalk}) {
+    for (const GpuOcclusion kernel : {GpuOcclusion::kQueue, GpuOcclusion::kWalk}) {
       GpuConfig config = config_;
-      config.occlusion = counting;
+      config.occlusion = kernel;
       expect_same(baked, config, width, height);
     }
   }

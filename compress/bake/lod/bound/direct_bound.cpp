@@ -18,7 +18,7 @@ namespace {
 using Corners = std::array<DVec3, 3>;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-3; // steps; tolerance when triangles are clipped
-constexpr double kSlack = 1.25;    // errors within this factor of largest_ are good enough
+constexpr double kSlack = 1.25;    // errors up to largest_ times this are not reduced further
 // At most max(kFew, 1 / kMeasuredFraction of all triangles) are measured: if more have large errors, tightening them
 // gains little.
 constexpr size_t kFew = 512, kMeasuredFraction = 8;
@@ -102,7 +102,7 @@ public:
   }
 
 private:
-  /// Errors up to here neither need a closer look nor raise largest_.
+  /// Errors up to this limit are not measured further and do not raise largest_.
   double limit() const { return kSlack * largest_; }
 
   /// Limits the work in soups: where every triangle is near all others, more measuring gains little.

@@ -33,6 +33,7 @@ struct Claim {
   bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : index > o.index; }
 };
 
+/// Lists the source triangles that each simplified triangle is linked to, in the order of the links.
 /// @param count number of simplified triangles
 LinkLists link_lists(std::span<const SurfaceLink> links, size_t count) {
   LinkLists lists{std::vector<uint32_t>(count + 1), std::vector<uint32_t>(links.size())};

@@ -35,7 +35,7 @@ public:
 
   // The candidates: triangles of this side that another triangle is measured against.
   std::span<const uint32_t> candidates() const { return candidates_; }
-  /// Makes some triangles and those around three points the candidates, in this order.
+  /// Sets the candidates: the triangles of `first`, then those around three points.
   void gather(const Triangle& corners, std::span<const uint32_t> first = {});
   /// Adds one candidate after gather(), unless it is there already.
   void add(uint32_t triangle) {
