@@ -42,9 +42,9 @@ bool equal(const MotionKey& a, const MotionKey& b) {
 
 /// Whether a key has the limits of files of keys.
 bool is_within_range(const MotionKey& key) {
-  constexpr double kMost = 1e30;
+  constexpr double kMaxMagnitude = 1e30;
   const auto small = [](const DVec3& v) {
-    return std::abs(v.x) <= kMost && std::abs(v.y) <= kMost && std::abs(v.z) <= kMost;
+    return std::abs(v.x) <= kMaxMagnitude && std::abs(v.y) <= kMaxMagnitude && std::abs(v.z) <= kMaxMagnitude;
   };
   const glm::dquat& q = key.rotation;
   return small(key.translation) && small(key.scale[0]) && small(key.scale[1]) && small(key.scale[2]) &&

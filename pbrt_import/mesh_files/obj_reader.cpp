@@ -94,8 +94,8 @@ private:
 
   void reserve() {
     const ObjCounts counts = count_statements(content_.text);
-    constexpr auto kMost = static_cast<uint64_t>(std::numeric_limits<int32_t>::max());
-    if (counts.positions > kMost || counts.uvs > kMost || counts.normals > kMost)
+    constexpr auto kMaxCount = static_cast<uint64_t>(std::numeric_limits<int32_t>::max());
+    if (counts.positions > kMaxCount || counts.uvs > kMaxCount || counts.normals > kMaxCount)
       throw Error(ErrorKind::kLimitExceeded, "the file has more than 2^31 - 1 vertices");
     count_memory((counts.positions + counts.normals) * sizeof(Vec3) + counts.uvs * sizeof(Vec2));
     positions_.reserve(counts.positions);

@@ -21,10 +21,10 @@ void require_sizes(const GBuffer& gbuffer, const AoFrame& ao) {
       (!ao.max_history.empty() && ao.max_history.size() != pixels) ||
       (!gbuffer.previous_z.empty() && gbuffer.previous_z.size() != pixels))
     throw Error(ErrorKind::kUsage, "denoiser: an array does not have one entry per pixel");
-  constexpr uint32_t kMostSamples = 65536;
-  if (ao.samples < 1 || ao.samples > kMostSamples)
+  constexpr uint32_t kMaxSamples = 65536;
+  if (ao.samples < 1 || ao.samples > kMaxSamples)
     throw Error(ErrorKind::kUsage, "denoiser: " + std::to_string(ao.samples) +
-                                       " samples per pixel: must be from 1 to " + std::to_string(kMostSamples));
+                                       " samples per pixel: must be from 1 to " + std::to_string(kMaxSamples));
   constexpr uint32_t kLargestSide = 1u << 20;
   if (gbuffer.size.width > kLargestSide || gbuffer.size.height > kLargestSide)
     throw Error(ErrorKind::kUsage,

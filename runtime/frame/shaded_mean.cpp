@@ -87,7 +87,7 @@ std::optional<Vec3> albedo_ratio(Vec3 now, Vec3 then) {
 
 /// The means that a pixel continues, without ambient light; without frames if there are none.
 ShadedPixel ShadedMean::reprojected(const GBuffer& g, size_t pixel, int x, int y) const {
-  constexpr float kLeastNormal = 0.9f, kDepthTolerance = 0.02f;
+  constexpr float kMinNormalCosine = 0.9f, kDepthTolerance = 0.02f;
   ShadedPixel sum;
   const Vec2 from = Vec2(static_cast<float>(x), static_cast<float>(y)) - g.motion_px[pixel];
   const float z = g.previous_z.empty() ? g.view_z[pixel] : g.previous_z[pixel];
@@ -104,7 +104,7 @@ ShadedPixel ShadedMean::reprojected(const GBuffer& g, size_t pixel, int x, int y
     const Surface& then = surfaces_[at];
     const float weight = (right != 0 ? part.x : 1.0f - part.x) * (down != 0 ? part.y : 1.0f - part.y);
     if (weight <= 0.0f || then.instance != g.instance[pixel] || then.material != g.material[pixel]) continue;
-    if (glm::dot(then.normal, g.normal[pixel]) < kLeastNormal) continue;
+    if (glm::dot(then.normal, g.normal[pixel]) < kMinNormalCosine) continue;
     if (std::abs(then.view_z - z) > kDepthTolerance * z) continue;
     const ShadedPixel& mean = before_[at];
     const std::optional<Vec3> ratio = albedo_ratio(g.albedo[pixel], then.albedo);

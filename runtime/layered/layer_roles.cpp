@@ -84,13 +84,13 @@ std::vector<std::string> components(const Group& group, uint32_t count) {
 }
 
 std::string channel_list(const ExrInfo& info) {
-  constexpr size_t kMost = 48;
+  constexpr size_t kMaxNames = 48;
   std::string list;
   size_t count = 0;
   for (const ExrLayer& layer : info.layers)
     for (const ExrChannel& channel : layer.channels)
-      if (++count <= kMost) list.append(list.empty() ? "" : ", ").append(channel.name);
-  return count > kMost ? list + " and " + std::to_string(count - kMost) + " more" : list;
+      if (++count <= kMaxNames) list.append(list.empty() ? "" : ", ").append(channel.name);
+  return count > kMaxNames ? list + " and " + std::to_string(count - kMaxNames) + " more" : list;
 }
 
 bool has_channel(const std::vector<Group>& groups, const std::string& channel) {

@@ -10,7 +10,7 @@ namespace packtrace {
 namespace {
 
 /// Below this fraction of shared surfaces two pictures are of different views.
-constexpr double kLeastShared = 0.1;
+constexpr double kMinShared = 0.1;
 
 /// The channels that hold the same occlusion: all colours of the layer.
 std::vector<std::string> equal_channels(const ExrPicture& file, const std::string& channel) {
@@ -51,8 +51,8 @@ HistoryStart LayeredDenoiser::history_start(bool cut) {
   if (previous_->size != g.size) return HistoryStart::kNewSize;
   if (cut) return HistoryStart::kCut;
   result_->shared = shared_surfaces(*previous_, g);
-  return *result_->shared < kLeastShared && result_->picture.counts.surfaces > 0 ? HistoryStart::kNewScene
-                                                                                 : HistoryStart::kContinued;
+  return *result_->shared < kMinShared && result_->picture.counts.surfaces > 0 ? HistoryStart::kNewScene
+                                                                               : HistoryStart::kContinued;
 }
 
 void LayeredDenoiser::add_to_history() {

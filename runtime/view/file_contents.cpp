@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-constexpr size_t kMostGeometries = 8;
+constexpr size_t kMaxGeometries = 8;
 
 /// Adds the parts of a tracer; shared ones count once.
 void add_resident(const RayTracer& tracer, bool first, FileContents::Rows& rows) {
@@ -51,7 +51,7 @@ FileContents::Rows traced_rows(const ViewFile& file, const LodPlan& plan) {
   for (size_t g = 0; g < triangles.size(); ++g)
     if (triangles[g] > 0) rows.emplace_back(g < names.size() ? names[g] : fmt::format("geometry {}", g), triangles[g]);
   std::ranges::stable_sort(rows, std::greater<>(), &FileContents::Rows::value_type::second);
-  if (rows.size() > kMostGeometries) rows.resize(kMostGeometries);
+  if (rows.size() > kMaxGeometries) rows.resize(kMaxGeometries);
   return rows;
 }
 

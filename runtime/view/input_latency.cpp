@@ -6,15 +6,15 @@
 namespace packtrace {
 namespace {
 
-constexpr size_t kMost = 1024;
+constexpr size_t kMaxLatencies = 1024;
 
 } // namespace
 
 void InputLatency::add(double ms) {
-  if (last_ms_.size() < kMost)
+  if (last_ms_.size() < kMaxLatencies)
     last_ms_.push_back(ms);
   else
-    last_ms_[count_ % kMost] = ms;
+    last_ms_[count_ % kMaxLatencies] = ms;
   ++count_;
 }
 

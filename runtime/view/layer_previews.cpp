@@ -98,13 +98,13 @@ Legend motion_legend(const RenderedImage& image) {
 
 /// The combinations of flags that cover most pixels.
 Legend flags_legend(const RenderedImage& image) {
-  constexpr size_t kMostBands = 6;
+  constexpr size_t kMaxBands = 6;
   std::map<uint32_t, size_t> pixels;
   for (size_t i = 0; i < image.material_flags.size(); ++i)
     if (image.coverage[i] > 0.0f) ++pixels[image.material_flags[i]];
   std::vector<std::pair<uint32_t, size_t>> sorted(pixels.begin(), pixels.end());
   std::ranges::stable_sort(sorted, std::greater<>(), &std::pair<uint32_t, size_t>::second);
-  sorted.resize(std::min(sorted.size(), kMostBands));
+  sorted.resize(std::min(sorted.size(), kMaxBands));
   if (sorted.empty()) sorted.emplace_back(0, 0);
   std::vector<std::pair<Vec3, std::string>> bands;
   for (const auto& [flags, count] : sorted) bands.emplace_back(id_color(flags), material_flag_words(flags));

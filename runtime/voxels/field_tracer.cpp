@@ -52,7 +52,7 @@ std::optional<FieldHit> FieldTracer::first_hit(glm::dvec3 origin, glm::dvec3 dir
   if (!(enter <= leave) || !is_finite(start)) return std::nullopt;
   const auto length = static_cast<float>(leave - enter);
   // Interpolated distances may exceed the true ones a little: shorter steps do not pass through thin things.
-  constexpr float kCaution = 0.85f, kLeastStep = 0.02f;
+  constexpr float kCaution = 0.85f, kMinStep = 0.02f;
   const float surface = has_sign_ ? kSurface : kUnsignedSurface;
   for (float t = 0.0f; t <= length;) {
     const glm::vec3 p = start + t * way;
@@ -63,7 +63,7 @@ std::optional<FieldHit> FieldTracer::first_hit(glm::dvec3 origin, glm::dvec3 dir
       return FieldHit{enter + double{t}, facing(gradient(p), way, from_inside)};
     }
     // Without signs a step must not end close to the surface, where the gradient would mix both of its sides.
-    t += std::max(kCaution * (has_sign_ ? distance : distance - surface), kLeastStep);
+    t += std::max(kCaution * (has_sign_ ? distance : distance - surface), kMinStep);
   }
   return std::nullopt;
 }

@@ -7,7 +7,7 @@
 namespace packtrace {
 
 ProxyReach::ProxyReach(const Proxy& proxy) {
-  constexpr uint32_t kMostDecoded = 256;
+  constexpr uint32_t kMaxDecodedSide = 256;
   const VoxelIndex size = proxy.frame().size;
   reach_.fill(-std::numeric_limits<double>::infinity());
   const auto add = [&](VoxelIndex low, VoxelIndex high) {
@@ -22,7 +22,7 @@ ProxyReach::ProxyReach(const Proxy& proxy) {
         }
   };
   bool any = false;
-  if (!proxy.is_field() && std::ranges::max(size) <= kMostDecoded) {
+  if (!proxy.is_field() && std::ranges::max(size) <= kMaxDecodedSide) {
     const VoxelSet set = decode_occupancy(proxy.voxels);
     VoxelIndex first{}, last{};
     set.for_each([&](VoxelIndex v) {

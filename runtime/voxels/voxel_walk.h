@@ -45,7 +45,7 @@ public:
       return t < t_ || (t == t_ && (axis < 0 || a <= axis));
     };
     for (int a = 0; a < 3; ++a) {
-      exit_[a] = a == axis ? Wide(-1) : Wide(0);
+      exit_[a] = a == axis ? MaskInt(-1) : MaskInt(0);
       const int32_t last = size_[a] - 1;
       if (direction_[a] == Real(0)) {
         voxel_[a] = clamp_to(origin_[a], 0, last);
@@ -84,8 +84,8 @@ public:
 private:
   using Ints [[gnu::vector_size(16)]] = int32_t;
   using Reals [[gnu::vector_size(4 * sizeof(Real))]] = Real;
-  using Wide = std::conditional_t<sizeof(Real) == 4, int32_t, int64_t>;
-  using Masks [[gnu::vector_size(4 * sizeof(Real))]] = Wide; // the type of comparisons of Reals
+  using MaskInt = std::conditional_t<sizeof(Real) == 4, int32_t, int64_t>;
+  using Masks [[gnu::vector_size(4 * sizeof(Real))]] = MaskInt; // the type of comparisons of Reals
 
   // Cells of at most 2^kSteppedShift voxels along each axis are left voxel by voxel, which is faster.
   static constexpr uint32_t kSteppedShift = 1;

@@ -11,13 +11,13 @@
 namespace packtrace {
 namespace {
 
-using Wide = __int128;
+using Int128 = __int128;
 
 /// Whether a triangle touches a closed cube: no axis separates the corners of one from those of the other.
 bool touches(const FineTriangle& t, std::array<int64_t, 3> lo, int64_t edge) {
-  using V = std::array<Wide, 3>;
+  using V = std::array<Int128, 3>;
   const auto sub = [](const FinePoint& a, const FinePoint& b) {
-    return V{Wide{a[0]} - b[0], Wide{a[1]} - b[1], Wide{a[2]} - b[2]};
+    return V{Int128{a[0]} - b[0], Int128{a[1]} - b[1], Int128{a[2]} - b[2]};
   };
   const auto cross = [](const V& a, const V& b) {
     return V{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -28,15 +28,15 @@ bool touches(const FineTriangle& t, std::array<int64_t, 3> lo, int64_t edge) {
   for (size_t e = 0; e < 3; ++e)
     for (size_t a = 0; a < 3; ++a) axes.push_back(cross(axes[a], edges[e]));
   for (const V& axis : axes) {
-    const auto along = [&](Wide x, Wide y, Wide z) { return axis[0] * x + axis[1] * y + axis[2] * z; };
-    Wide tri_lo = along(t[0][0], t[0][1], t[0][2]), tri_hi = tri_lo;
+    const auto along = [&](Int128 x, Int128 y, Int128 z) { return axis[0] * x + axis[1] * y + axis[2] * z; };
+    Int128 tri_lo = along(t[0][0], t[0][1], t[0][2]), tri_hi = tri_lo;
     for (const FinePoint& p : t) {
-      const Wide d = along(p[0], p[1], p[2]);
+      const Int128 d = along(p[0], p[1], p[2]);
       tri_lo = std::min(tri_lo, d), tri_hi = std::max(tri_hi, d);
     }
-    Wide box_lo = along(lo[0], lo[1], lo[2]), box_hi = box_lo;
+    Int128 box_lo = along(lo[0], lo[1], lo[2]), box_hi = box_lo;
     for (int c = 1; c < 8; ++c) {
-      const Wide d = along(lo[0] + (c & 1) * edge, lo[1] + (c >> 1 & 1) * edge, lo[2] + (c >> 2) * edge);
+      const Int128 d = along(lo[0] + (c & 1) * edge, lo[1] + (c >> 1 & 1) * edge, lo[2] + (c >> 2) * edge);
       box_lo = std::min(box_lo, d), box_hi = std::max(box_hi, d);
     }
     if (tri_hi < box_lo || box_hi < tri_lo) return false;

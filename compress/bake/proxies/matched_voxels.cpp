@@ -13,7 +13,7 @@ namespace {
 
 constexpr float kNever = std::numeric_limits<float>::infinity();
 constexpr int kDirections = 48;
-constexpr double kSpacing = 0.5, kMostLines = 64.0; // voxels; along a side of each direction's lines
+constexpr double kSpacing = 0.5, kMaxLines = 64.0; // voxels; along a side of each direction's lines
 
 /// Parallel lines through a grid, spaced on a square lattice perpendicular to their direction.
 class ParallelLines {
@@ -31,7 +31,7 @@ public:
       low = glm::min(low, p), high = glm::max(high, p);
     }
     low_ = low;
-    spacing_ = std::max(kSpacing, std::max(high.x - low.x, high.y - low.y) / kMostLines);
+    spacing_ = std::max(kSpacing, std::max(high.x - low.x, high.y - low.y) / kMaxLines);
     width_ = static_cast<int>(std::ceil((high.x - low.x) / spacing_));
     height_ = static_cast<int>(std::ceil((high.y - low.y) / spacing_));
   }

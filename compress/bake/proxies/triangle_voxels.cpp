@@ -41,29 +41,29 @@ TriangleVoxels::TriangleVoxels(const FineTriangle& triangle, int64_t edge, Voxel
   }
   empty_ = false;
   if (one_voxel && rule == VoxelRule::kConservative) return;
-  const std::array<std::array<Wide, 3>, 3> edges = {
+  const std::array<std::array<Int128, 3>, 3> edges = {
       difference(triangle[1], triangle[0]), difference(triangle[2], triangle[1]), difference(triangle[0], triangle[2])};
   add_axis(cross(edges[0], edges[1]), triangle, edge, rule);
-  for (const std::array<Wide, 3>& e : edges) {
+  for (const std::array<Int128, 3>& e : edges) {
     add_axis({0, -e[2], e[1]}, triangle, edge, rule);
     add_axis({e[2], 0, -e[0]}, triangle, edge, rule);
     add_axis({-e[1], e[0], 0}, triangle, edge, rule);
   }
 }
 
-void TriangleVoxels::add_axis(const std::array<Wide, 3>& direction, const FineTriangle& triangle, int64_t edge,
+void TriangleVoxels::add_axis(const std::array<Int128, 3>& direction, const FineTriangle& triangle, int64_t edge,
                               VoxelRule rule) {
   const auto [low, high] =
       std::minmax({dot(direction, triangle[0]), dot(direction, triangle[1]), dot(direction, triangle[2])});
-  Wide sum = 0, reach = 0;
-  for (const Wide d : direction) {
+  Int128 sum = 0, reach = 0;
+  for (const Int128 d : direction) {
     sum += d;
     reach = rule == VoxelRule::kSeparating ? std::max(reach, magnitude(d)) : reach + magnitude(d);
   }
   if (reach == 0) return;
   // Twice the centre's place along the direction is 2 edge direction . (x, y, z) + edge sum; it may differ from twice
   // the triangle's range by edge reach.
-  const Wide scale = 2 * Wide{edge};
+  const Int128 scale = 2 * Int128{edge};
   HalfSpace& above = half_spaces_[count_++];
   above = {{scale * direction[0], scale * direction[1], scale * direction[2]}, edge * (sum + reach) - 2 * low};
   HalfSpace& below = half_spaces_[count_++];
@@ -73,7 +73,7 @@ void TriangleVoxels::add_axis(const std::array<Wide, 3>& direction, const FineTr
 bool TriangleVoxels::row(uint32_t y, uint32_t z, int64_t& first, int64_t& last) const {
   for (uint32_t h = 0; h < count_; ++h) {
     const HalfSpace& half = half_spaces_[h];
-    const Wide rest = half.axis[1] * y + half.axis[2] * z + half.constant, slope = half.axis[0];
+    const Int128 rest = half.axis[1] * y + half.axis[2] * z + half.constant, slope = half.axis[0];
     if (slope == 0) {
       if (rest < 0) return false;
       continue;
@@ -81,14 +81,14 @@ bool TriangleVoxels::row(uint32_t y, uint32_t z, int64_t& first, int64_t& last) 
     // Most rows have one to three voxels: testing both ends is cheaper than a division.
     while (first <= last && slope > 0 && slope * first + rest < 0) {
       if (last - first > 2) {
-        first = static_cast<int64_t>(std::min<Wide>(-floor_div(rest, slope), Wide{last} + 1));
+        first = static_cast<int64_t>(std::min<Int128>(-floor_div(rest, slope), Int128{last} + 1));
         break;
       }
       ++first;
     }
     while (first <= last && slope < 0 && slope * last + rest < 0) {
       if (last - first > 2) {
-        last = static_cast<int64_t>(std::max<Wide>(floor_div(rest, -slope), Wide{first} - 1));
+        last = static_cast<int64_t>(std::max<Int128>(floor_div(rest, -slope), Int128{first} - 1));
         break;
       }
       --last;

@@ -32,14 +32,14 @@ public:
   }
 
 private:
-  using Wide = __int128;
+  using Int128 = __int128;
   /// a x + b y + c z + d >= 0
   struct HalfSpace {
-    std::array<Wide, 3> axis;
-    Wide constant;
+    std::array<Int128, 3> axis;
+    Int128 constant;
   };
 
-  void add_axis(const std::array<Wide, 3>& direction, const FineTriangle& triangle, int64_t edge, VoxelRule rule);
+  void add_axis(const std::array<Int128, 3>& direction, const FineTriangle& triangle, int64_t edge, VoxelRule rule);
   bool row(uint32_t y, uint32_t z, int64_t& first, int64_t& last) const;
 
   VoxelIndex lo_{}, hi_{};

@@ -42,7 +42,7 @@ public:
   float level(size_t texel) const { return wanted_[texel] + error_[texel]; }
 
 private:
-  static constexpr float kLeast = 1e-3f; // of a gain, so that rounding cannot let the search go on for ever
+  static constexpr float kMinGain = 1e-3f; // of a gain, so that rounding cannot let the search go on for ever
 
   size_t at(int32_t x, int32_t y) const {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
@@ -82,7 +82,7 @@ private:
   }
 
   bool try_flip(int32_t x, int32_t y) {
-    if (!(growth(x, y) < -kLeast)) return false;
+    if (!(growth(x, y) < -kMinGain)) return false;
     flip(x, y);
     return true;
   }
@@ -91,7 +91,7 @@ private:
     if (bits_[at(x, y)] == bits_[at(u, v)]) return false;
     const float first = growth(x, y);
     flip(x, y);
-    if (first + growth(u, v) < -kLeast) {
+    if (first + growth(u, v) < -kMinGain) {
       flip(u, v);
       return true;
     }

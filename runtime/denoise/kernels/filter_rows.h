@@ -26,7 +26,7 @@ inline int16_t in_ao_units(float ao) {
 /// those of pixels that hit something are at least 1 unit, and 0 means a miss. 1.375 times the largest one fits.
 inline constexpr float kPrecisionUnits = 47.0f;
 
-inline constexpr float kMostPrecision = 1000.0f * kPrecisionUnits;
+inline constexpr float kMaxPrecision = 1000.0f * kPrecisionUnits;
 
 /// 0.707 and 0.499 in units of 2^-16, per unit of a guide weight.
 inline constexpr uint16_t kStraight = 182, kDiagonal = 128;
@@ -34,7 +34,7 @@ inline constexpr uint16_t kStraight = 182, kDiagonal = 128;
 inline constexpr float kLoneBase = 0.7f, kLoneYoung = 0.3f;
 inline constexpr float kMaxVariance = 0.25f; ///< of values in [0, 1]
 /// In units of 1 / kPrecisionUnits; the sum of nine squares fits.
-inline constexpr uint16_t kMostDeviations = 240;
+inline constexpr uint16_t kMaxDeviations = 240;
 
 /// What guide weights compare, for one row of pixels.
 struct SurfaceRow {
@@ -54,7 +54,7 @@ inline constexpr uint8_t kLoneGuide = 17;
 inline constexpr int kCompany = 3 * 255;
 
 /// Largest share of GuideTerms::bend in the tolerance, in units of that of GuideTerms::depth.
-inline constexpr float kMostBend = 5.0f;
+inline constexpr float kMaxBend = 5.0f;
 
 struct GuideTerms {
   float depth, slope, bend;

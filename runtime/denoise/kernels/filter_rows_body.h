@@ -44,7 +44,7 @@ inline I32 guide_weights(const Surfaces& p, F32 rise_p, const Surfaces& q, F32 r
   // The flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette. There, their
   // difference says nothing of a curvature, so it counts up to a limit.
   const F32 allowed = least + lesser(magnitude(rise_p), magnitude(rise_q)) * t.slope +
-                      lesser(magnitude(rise_p - rise_q) * t.bend, least * kMostBend) + 1e-37f * scale;
+                      lesser(magnitude(rise_p - rise_q) * t.bend, least * kMaxBend) + 1e-37f * scale;
   const F32 depth = greater(all(0.0f), 1.0f - distance / allowed);
   const I32 dot = sum_of_products(p.normal_xy, q.normal_xy) + sum_of_products(p.normal_z, q.normal_z);
   F32 cosine = lesser(greater(as_floats(dot) * kSquaredNormalUnit, all(0.0f)), all(1.0f));
@@ -113,7 +113,7 @@ void compare_row(int width, int step, const NoisyRow& here, const NoisyRow& belo
                  const std::array<uint16_t*, 4>& distance) {
   const NoisyRow p = here, q = below;
   uint16_t *right = distance[0], *down = distance[1], *down_right = distance[2], *down_left = distance[3];
-  const U16 nothing = all(no_distance), most = all(kMostDeviations);
+  const U16 nothing = all(no_distance), most = all(kMaxDeviations);
   for (int x = 0; x < width; x += kLanes) {
     const I16 value = load(p.value + x);
     const U16 own_precision = load(p.precision + x);
@@ -193,11 +193,11 @@ void normalise_row(int width, int step, const WeightRow& here, const WeightRow& 
 
 void normalise_first_row(int width, int step, const WeightRow& here, const WeightRow& above, const uint16_t* lone,
                          uint16_t* scale) {
-  constexpr uint16_t kLeast = 1025; // so that the result has 16 bits
+  constexpr uint16_t kMinScale = 1025; // so that the result has 16 bits
   for (int x = 0; x < width; x += kLanes) {
     const Neighbours weights(here, above, x, step);
     const U16 own = 8192 - product(65535 - weights.largest(), load(lone + x));
-    store(scale + x, greater(own + weights.mean(), all(kLeast)));
+    store(scale + x, greater(own + weights.mean(), all(kMinScale)));
   }
   invert_row(width, 8192.0f * 8192.0f, scale);
 }
@@ -208,7 +208,7 @@ void raise_precisions(int width, const uint16_t* variance, const uint16_t* befor
   for (int x = 0; x < whole_vectors(width); ++x) {
     const float left = static_cast<float>(static_cast<int>(variance[x])) * (1.0f / 16384.0f);
     const float p = static_cast<float>(static_cast<int>(before[x])) * greater(reciprocal_root(left), 1.0f);
-    precision[x] = static_cast<uint16_t>(static_cast<int>(lesser(p + 0.5f, kMostPrecision)));
+    precision[x] = static_cast<uint16_t>(static_cast<int>(lesser(p + 0.5f, kMaxPrecision)));
   }
 }
 
@@ -357,7 +357,7 @@ void variance_row(int width, const HistoryOfRow& history, const MomentWindow& wi
     const F32 told = select(seen, v * (1.0f + sample_share * (t.young + t.distrust * sample_share)),
                             all(kMaxVariance * (1.0f + t.distrust)));
     const F32 root = reciprocal_root(2.0f * t.tolerance * told + 1e-6f);
-    const F32 precision = lesser(greater(kPrecisionUnits * root + 0.5f, all(1.0f)), all(kMostPrecision));
+    const F32 precision = lesser(greater(kPrecisionUnits * root + 0.5f, all(1.0f)), all(kMaxPrecision));
     const F32 bounded = lesser(greater(all(0.0f), a), all(1.0f)); // in_ao_units()
     store_words(o.value + x, truncated(bounded * float{kAoUnits} + 0.5f));
     store_words(o.precision + x, truncated(select(load(h.disparity + x) > 0.0f, precision, all(0.0f))));

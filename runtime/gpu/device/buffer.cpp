@@ -10,7 +10,7 @@
 namespace packtrace::gpu {
 namespace {
 
-constexpr uint64_t kLeastBytes = 256;
+constexpr uint64_t kMinBytes = 256;
 constexpr uint64_t kStagingBytes = uint64_t{64} << 20;
 
 void copy_bytes(std::byte* to, const std::byte* from, size_t bytes) {
@@ -20,7 +20,7 @@ void copy_bytes(std::byte* to, const std::byte* from, size_t bytes) {
 } // namespace
 
 Buffer::Buffer(std::shared_ptr<Device> device, uint64_t bytes, BufferPlace place, const char* what)
-    : device_(std::move(device)), bytes_((std::max(bytes, kLeastBytes) + 15) / 16 * 16) {
+    : device_(std::move(device)), bytes_((std::max(bytes, kMinBytes) + 15) / 16 * 16) {
   if (place != BufferPlace::kUnbound && bytes_ > device_->limits().maxStorageBufferRange)
     throw Error(ErrorKind::kUnsupported, "backend gpu: " + std::string(what) + " need " + std::to_string(bytes_) +
                                              " bytes, but kernels of " + device_->name() + " can address " +

@@ -8,7 +8,7 @@
 namespace packtrace::gpu {
 
 void Commands::dispatch(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups_x, uint32_t groups_y) {
-  assert(push.size() <= kMostPushBytes);
+  assert(push.size() <= kMaxPushBytes);
   Step step;
   step.kernel = &kernel;
   std::ranges::copy(push, step.push.begin());

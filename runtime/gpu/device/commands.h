@@ -18,7 +18,7 @@ class Kernel;
 class Commands {
 public:
   /// Kernels and buffers must outlive the run.
-  /// @param push push constants, at most kMostPushBytes
+  /// @param push push constants, at most kMaxPushBytes
   void dispatch(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups_x, uint32_t groups_y);
   void copy(const Buffer& from, const Buffer& to, uint64_t bytes) { copy(from, to, 0, bytes); }
   /// @param offset of the bytes in both buffers
@@ -29,8 +29,8 @@ public:
   /// Sets words of a buffer.
   void fill(const Buffer& buffer, uint64_t first_word, uint64_t words, uint32_t value);
 
-  static constexpr size_t kMostPushBytes = 128; ///< that every device has
-  static constexpr uint32_t kMostDispatches = 32;
+  static constexpr size_t kMaxPushBytes = 128; ///< that every device has
+  static constexpr uint32_t kMaxDispatches = 32;
 
 private:
   friend class Device;
@@ -39,7 +39,7 @@ private:
   struct Step {
     Kind kind = Kind::kDispatch;
     const Kernel* kernel = nullptr;
-    std::array<std::byte, kMostPushBytes> push{};
+    std::array<std::byte, kMaxPushBytes> push{};
     uint32_t push_bytes = 0, groups_x = 0, groups_y = 0;
     VkBuffer from = VK_NULL_HANDLE, to = VK_NULL_HANDLE;
     uint64_t from_offset = 0, offset = 0, bytes = 0; ///< offset: in `to`

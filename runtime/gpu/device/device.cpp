@@ -109,7 +109,7 @@ void Device::record(const Commands& commands) {
 std::vector<double> Device::run(const Commands& commands) {
   const auto dispatches = static_cast<size_t>(std::ranges::count_if(
       commands.steps_, [](const Commands::Step& step) { return step.kind == Commands::Kind::kDispatch; }));
-  assert(dispatches <= Commands::kMostDispatches);
+  assert(dispatches <= Commands::kMaxDispatches);
   std::vector<double> times(dispatches);
   submit([&](VkCommandBuffer) { record(commands); }, times);
   if (queries_ == VK_NULL_HANDLE || on_cpu()) times.clear();

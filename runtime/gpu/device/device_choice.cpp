@@ -282,7 +282,7 @@ void Device::create_device() {
   VkQueryPoolCreateInfo queries{};
   queries.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO;
   queries.queryType = VK_QUERY_TYPE_TIMESTAMP;
-  queries.queryCount = 2 + 2 * Commands::kMostDispatches;
+  queries.queryCount = 2 + 2 * Commands::kMaxDispatches;
   check(vkCreateQueryPool(device_, &queries, nullptr, &queries_), "vkCreateQueryPool");
 }
 

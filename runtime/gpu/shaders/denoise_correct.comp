@@ -13,13 +13,13 @@ layout(std430, binding = 0) readonly restrict buffer Samples { vec2 samples[]; }
 layout(std430, binding = 1) restrict buffer History { vec2 history[]; };
 layout(std430, binding = 2) restrict buffer Rest { uvec2 rest[]; }; // moments, trend
 
-const int kWide = 32, kHigh = 16, kBorder = 4; // pixels of a group; border
-shared vec2 s_sample[(kHigh + 2 * kBorder) * (kWide + 2 * kBorder)];
-shared uint s_count[(kHigh + 2 * kBorder) * kWide]; // | of the narrow window << 16
-shared vec4 s_sums[(kHigh + 2 * kBorder) * kWide];  // value, square, change, change of the narrow window
+const int kGroupWidth = 32, kGroupHeight = 16, kBorder = 4; // pixels of a group; border
+shared vec2 s_sample[(kGroupHeight + 2 * kBorder) * (kGroupWidth + 2 * kBorder)];
+shared uint s_count[(kGroupHeight + 2 * kBorder) * kGroupWidth]; // | of the narrow window << 16
+shared vec4 s_sums[(kGroupHeight + 2 * kBorder) * kGroupWidth];  // value, square, change, change of the narrow window
 
 void load_samples(ivec2 origin) {
-  const int stride = kWide + 2 * kBorder;
+  const int stride = kGroupWidth + 2 * kBorder;
   for (uint i = gl_LocalInvocationIndex; i < s_sample.length(); i += kThreads) {
     ivec2 p = origin + ivec2(int(i) % stride, int(i) / stride) - kBorder;
     s_sample[i] = inside(p) ? samples[index_of(p)] : vec2(-1.0, 0.0);
@@ -28,7 +28,7 @@ void load_samples(ivec2 origin) {
 
 void sum_rows() {
   for (uint i = gl_LocalInvocationIndex; i < s_count.length(); i += kThreads) {
-    uint at = i / kWide * (kWide + 2 * kBorder) + i % kWide + kBorder;
+    uint at = i / kGroupWidth * (kGroupWidth + 2 * kBorder) + i % kGroupWidth + kBorder;
     vec2 c = s_sample[at], l = s_sample[at - 1u], r = s_sample[at + 1u];
     uint narrow = uint(l.x >= 0.0) + uint(c.x >= 0.0) + uint(r.x >= 0.0), count = narrow;
     precise float narrow_change = l.y + c.y + r.y;
@@ -56,7 +56,7 @@ void correct(ivec2 p, uint at) {
   float count = 0.0, narrow_count = 0.0;
   precise float value = 0.0, squares = 0.0, change = 0.0, narrow_change = 0.0;
   for (uint r = 0u; r <= 2u * kRadius; ++r) {
-    uint row = at + (r + kBorder - kRadius) * kWide;
+    uint row = at + (r + kBorder - kRadius) * kGroupWidth;
     uint counts = s_count[row];
     vec4 sums = s_sums[row];
     count += float(counts & 0xffffu);
@@ -92,7 +92,7 @@ void correct(ivec2 p, uint at) {
 }
 
 void main() {
-  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh);
+  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kGroupWidth, kGroupHeight);
   load_samples(origin);
   barrier();
   sum_rows();

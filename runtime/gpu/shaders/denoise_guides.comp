@@ -11,10 +11,10 @@ layout(std430, binding = 0) readonly restrict buffer Guides { uvec4 guides[]; };
 layout(std430, binding = 1) readonly restrict buffer Changes { uint changes[]; };
 layout(std430, binding = 2) writeonly restrict buffer PairGuides { uint pair_guides[]; }; // planes of the steps 1, 2, 4
 
-const int kWide = 32, kHigh = 16;                   // pixels of a group
+const int kGroupWidth = 32, kGroupHeight = 16;                   // pixels of a group
 const int kSide = 5, kBelow = 5;                    // surfaces outside it that are read; above: 1
-const int kStride = kWide + 2 * kSide, kRows = kHigh + 1 + kBelow;
-const int kLoneStride = kWide + 8, kLoneRows = kHigh + 4;
+const int kStride = kGroupWidth + 2 * kSide, kRows = kGroupHeight + 1 + kBelow;
+const int kLoneStride = kGroupWidth + 8, kLoneRows = kGroupHeight + 4;
 
 // dx, dy: change of the disparity per pixel. Normals are read from the cache, for the sake of shared memory.
 shared float s_disparity[kRows * kStride], s_dx[kRows * kStride], s_dy[kRows * kStride];
@@ -56,10 +56,10 @@ uint guide_weight(int p, int q, vec2 offset) {
   precise float away = greater(abs(difference - rise_p), abs(difference - rise_q));
   precise float least = terms.guide_depth * lesser(dp, dq);
   precise float allowed = least + terms.guide_slope * lesser(abs(rise_p), abs(rise_q)) +
-                          lesser(terms.guide_bend * abs(rise_p - rise_q), kMostBend * least) + 1e-37;
+                          lesser(terms.guide_bend * abs(rise_p - rise_q), kMaxBend * least) + 1e-37;
   precise float depth = greater(0.0, 1.0 - away / allowed);
   if (depth == 0.0) return uint(kMinGuide);
-  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh);
+  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kGroupWidth, kGroupHeight);
   int dot = dot_of(normal_at(p, origin), normal_at(q, origin));
   precise float cosine = lesser(greater(float(dot) * kSquaredNormalUnit, 0.0), 1.0);
   cosine *= cosine;
@@ -118,7 +118,7 @@ uint raised_weights(uint weights, int lone, int apart) {
 
 void main() {
   if (changes[1] == 0u) return; // the weights are those of the frame before
-  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh);
+  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kGroupWidth, kGroupHeight);
   load_surfaces(origin);
   barrier();
   find_near();

@@ -19,11 +19,12 @@ layout(std430, binding = 4) restrict buffer Result { float result[]; };
 #include "denoise_finish.glsl"
 
 // Pixels of a group. Values are read up to 2 STEP + 1 pixels outside it, weights up to 2 STEP, divisors up to STEP.
-const int kWide = 32, kHigh = 16;
+const int kGroupWidth = 32, kGroupHeight = 16;
 const int kBorder = 2 * STEP + 1;
-const int kStride = kWide + 2 * kBorder, kRows = kHigh + 2 * kBorder;
-const int kPairStride = kWide + 4 * STEP, kPairRows = kHigh + 3 * STEP; // of weights; rows end STEP below the group
-const int kScaleStride = kWide + 2 * STEP, kScaleRows = kHigh + 2 * STEP;
+const int kStride = kGroupWidth + 2 * kBorder, kRows = kGroupHeight + 2 * kBorder;
+// Of weights; rows end STEP below the group.
+const int kPairStride = kGroupWidth + 4 * STEP, kPairRows = kGroupHeight + 3 * STEP;
+const int kScaleStride = kGroupWidth + 2 * STEP, kScaleRows = kGroupHeight + 2 * STEP;
 const int kDistanceRows = kPairRows + 2;
 
 shared uint s_noisy[kRows * kStride];             // value | precision << 16
@@ -43,7 +44,7 @@ uint distance_of(uint p, uint q) {
   uint precision_of_pair = min(mean_up(least, mean_up(least, most)), least + (least >> 2) + (least >> 3));
   if (precision_of_pair == 0u) return terms.no_distance;
   uint difference = uint(abs(int(q & 0xffffu) - int(p & 0xffffu)));
-  uint deviations = min(product(difference << 1, precision_of_pair), kMostDeviations);
+  uint deviations = min(product(difference << 1, precision_of_pair), kMaxDeviations);
   return (deviations * (deviations + 1u)) >> 3;
 }
 
@@ -158,11 +159,11 @@ uint exchanged(ivec2 local) {
   uint kept = 32768u - e.taken;
   precise float left = float(product(kept, kept) + e.squares) * (1.0 / 16384.0); // of the variance
   precise float raised = float(s_noisy[at] >> 16) * greater(reciprocal_root(left), 1.0);
-  return uint(clamp(e.value + e.flux, 0, 32767)) | (uint(lesser(raised + 0.5, kMostPrecision)) << 16);
+  return uint(clamp(e.value + e.flux, 0, 32767)) | (uint(lesser(raised + 0.5, kMaxPrecision)) << 16);
 }
 
 void main() {
-  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh);
+  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kGroupWidth, kGroupHeight);
   load_noisy(origin);
   barrier();
   compare();
@@ -172,7 +173,7 @@ void main() {
   normalise(origin);
   barrier();
   ivec2 local = ivec2(gl_LocalInvocationID.xy), p = origin + local;
-  if (local.y >= kHigh || !inside(p)) return;
+  if (local.y >= kGroupHeight || !inside(p)) return;
   uint noisy = exchanged(local);
   if (has(kLastPass))
     finish(index_of(p), noisy);

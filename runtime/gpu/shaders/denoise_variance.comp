@@ -13,11 +13,11 @@ layout(std430, binding = 4) readonly restrict buffer Changes { uint changes[]; }
 layout(std430, binding = 5) writeonly restrict buffer Noisy { uint noisy[]; };
 layout(std430, binding = 6) restrict buffer Result { float result[]; }; // planes of AO, variance and length
 
-const int kWide = 32, kHigh = 8, kBorder = 2;
-const int kStride = kWide + 2 * kBorder, kRows = kHigh + 2 * kBorder;
+const int kGroupWidth = 32, kGroupHeight = 8, kBorder = 2;
+const int kStride = kGroupWidth + 2 * kBorder, kRows = kGroupHeight + 2 * kBorder;
 // Counts: pixels | those with two samples << 8 | those with Trend::decay << 16.
-shared uint s_counts[kRows * kStride], s_row_counts[kRows * kWide];
-shared vec4 s_moments[kRows * kStride], s_rows[kRows * kWide]; // value, square, variance, Trend::decay
+shared uint s_counts[kRows * kStride], s_row_counts[kRows * kGroupWidth];
+shared vec4 s_moments[kRows * kStride], s_rows[kRows * kGroupWidth]; // value, square, variance, Trend::decay
 
 void load_moments(ivec2 origin) {
   for (uint i = gl_LocalInvocationIndex; i < s_counts.length(); i += 256u) {
@@ -40,7 +40,7 @@ void load_moments(ivec2 origin) {
 
 void sum_rows() {
   for (uint i = gl_LocalInvocationIndex; i < s_row_counts.length(); i += 256u) {
-    uint at = i / kWide * kStride + i % kWide;
+    uint at = i / kGroupWidth * kStride + i % kGroupWidth;
     s_row_counts[i] = s_counts[at] + s_counts[at + 1u] + s_counts[at + 2u] + s_counts[at + 3u] + s_counts[at + 4u];
     precise vec4 sums = ((s_moments[at] + s_moments[at + 1u]) + (s_moments[at + 2u] + s_moments[at + 3u])) +
                         s_moments[at + 4u];
@@ -130,7 +130,7 @@ float filled_value(ivec2 p) {
 }
 
 void main() {
-  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kWide, kHigh), p = ivec2(gl_GlobalInvocationID.xy);
+  ivec2 origin = ivec2(gl_WorkGroupID.xy) * ivec2(kGroupWidth, kGroupHeight), p = ivec2(gl_GlobalInvocationID.xy);
   load_moments(origin);
   barrier();
   sum_rows();
@@ -138,13 +138,13 @@ void main() {
   if (!inside(p)) return;
   uint at = gl_LocalInvocationIndex, counts = 0u, i = index_of(p);
   precise vec4 sums = vec4(0.0);
-  for (int r = 0; r < 5; ++r) counts += s_row_counts[at + r * kWide], sums += s_rows[at + r * kWide];
+  for (int r = 0; r < 5; ++r) counts += s_row_counts[at + r * kGroupWidth], sums += s_rows[at + r * kGroupWidth];
   vec2 slow = history[i];
   bool moves = has(kHasHistory) && has(kFollowMotion) && changes[0] != 0u;
   Variance v = variance_of(slow, moment_of(rest[i].x & 0xffffu), counts, sums, moves);
   precise float allowed = 2.0 * terms.noise_tolerance * v.told + 1e-6;
   float root = reciprocal_root(allowed);
-  precise float precision_units = lesser(greater(kPrecisionUnits * root + 0.5, 1.0), kMostPrecision);
+  precise float precision_units = lesser(greater(kPrecisionUnits * root + 0.5, 1.0), kMaxPrecision);
   // Resampled histories belong to surfaces.
   bool hit = (has(kFollowMotion) && slow.y > 0.0) || uintBitsToFloat(guides[i].x) > 0.0;
   float value = slow.x;

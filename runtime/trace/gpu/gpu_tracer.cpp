@@ -207,7 +207,7 @@ PointPlanes GpuTracer::read_points(const gpu::DeviceView& picture, bool with_nor
 /// Traces the rays of all points, of as many at once as there is memory for.
 void GpuTracer::trace_parts(const OcclusionPoints& points, const OcclusionSamples& samples, const TakeSums& take,
                             Progress& progress) const {
-  constexpr size_t kLeastPoints = 256;
+  constexpr size_t kMinPoints = 256;
   size_t at_once = points.count;
   uint64_t reported = 0;
   for (size_t first = 0; first < points.count;) {
@@ -222,7 +222,7 @@ void GpuTracer::trace_parts(const OcclusionPoints& points, const OcclusionSample
       report(1.0);
       first += count;
     } catch (const Error& error) { // fewer points at once, if there is no room for so many
-      if (error.kind() != ErrorKind::kLimitExceeded || count <= kLeastPoints) throw;
+      if (error.kind() != ErrorKind::kLimitExceeded || count <= kMinPoints) throw;
       at_once = count / 2;
       device_rays_->release();
       scene_->release_rays();

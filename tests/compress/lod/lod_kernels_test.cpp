@@ -288,7 +288,7 @@ TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
         avx2::nearest_triangle(far[0].data(), far[1].data(), far[2].data(), blocks.size());
     EXPECT_EQ(std::memcmp(&nearest, &same_nearest, sizeof nearest), 0);
 
-    const auto lay = [&](OverlayKernel kernel, std::vector<OverlayPiece>& pieces) {
+    const auto run_overlay = [&](OverlayKernel kernel, std::vector<OverlayPiece>& pieces) {
       std::vector<OverlayPoint> projected(s.points.size());
       std::vector<uint32_t> outside(s.points.size()), stamps(s.points.size()), corners(s.points.size());
       for (uint32_t i = 0; i < corners.size(); ++i) corners[i] = i;
@@ -307,7 +307,8 @@ TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
       return cover;
     };
     std::vector<OverlayPiece> pieces, same_pieces;
-    const OverlayCover cover = lay(overlay_kernel, pieces), same_cover = lay(avx2::overlay_kernel, same_pieces);
+    const OverlayCover cover = run_overlay(overlay_kernel, pieces),
+                       same_cover = run_overlay(avx2::overlay_kernel, same_pieces);
     EXPECT_EQ(cover.count, same_cover.count);
     EXPECT_EQ(cover.largest, same_cover.largest);
     ASSERT_EQ(pieces.size(), same_pieces.size());

@@ -18,8 +18,8 @@ using Motion = std::function<DVec3(DVec3 position)>;
 
 /// The lattice box of all vertices of a geometry in several frames.
 inline DeformingGeometry range_of(const BakedFile& file, uint32_t geometry, std::span<const Motion> frames) {
-  constexpr int64_t kMost = std::numeric_limits<int64_t>::max(), kLeast = std::numeric_limits<int64_t>::min();
-  DeformingGeometry out{geometry, {{kMost, kMost, kMost}, {kLeast, kLeast, kLeast}}};
+  constexpr int64_t kMax = std::numeric_limits<int64_t>::max(), kMin = std::numeric_limits<int64_t>::min();
+  DeformingGeometry out{geometry, {{kMax, kMax, kMax}, {kMin, kMin, kMin}}};
   const baked::GeometryRecord& record = file.geometries()[geometry];
   const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
   const auto extend = [&](const LatticePoint& q) {

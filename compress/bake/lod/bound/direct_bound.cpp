@@ -92,10 +92,10 @@ public:
       std::pop_heap(heap_.begin(), heap_.end());
       const auto [stated, number] = heap_.back();
       heap_.pop_back();
-      const bool is_before = number < in_.triangles.size();
-      const uint32_t t = is_before ? number : number - static_cast<uint32_t>(in_.triangles.size());
-      double& bound = is_before ? links_.bounds[t] : m_.triangles[t].error;
-      bound = std::min(stated, is_before ? measure_before(t, stated) : measure_after(t, stated));
+      const bool is_source = number < in_.triangles.size();
+      const uint32_t t = is_source ? number : number - static_cast<uint32_t>(in_.triangles.size());
+      double& bound = is_source ? links_.bounds[t] : m_.triangles[t].error;
+      bound = std::min(stated, is_source ? measure_source(t, stated) : measure_simplified(t, stated));
       if (bound > limit()) largest_ = bound;
     }
     links_.links.insert(links_.links.end(), found_.begin(), found_.end());
@@ -133,7 +133,7 @@ private:
     return {point(t.x), point(t.y), point(t.z)};
   }
 
-  Corners corners_before(uint32_t t) const {
+  Corners source_corners(uint32_t t) const {
     const Triangle& p = in_.triangles[t].points;
     return {in_.points[p.x], in_.points[p.y], in_.points[p.z]};
   }
@@ -161,13 +161,13 @@ private:
   // ---- from lower levels to the simplified surface
 
   /// Bounds the error of a source triangle. Goes one level further back only for parts that are still too far off.
-  double measure_before(uint32_t t, double stated) {
-    const Corners corners = corners_before(t);
+  double measure_source(uint32_t t, double stated) {
+    const Corners corners = source_corners(t);
     const Neighbourhood near(corners);
     const double inherited = in_.triangles[t].error;
     const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - inherited;
     const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + inherited;
-    gather_after(t);
+    gather_simplified(t);
     set_.clear(), vertices_.clear(), distances_.clear();
     for (const uint32_t s : simplified_.candidates()) set_.add(simplified_.surface(), s);
     double largest = 0.0, worst = 0.0; // of parts near enough, and of the others
@@ -218,7 +218,7 @@ private:
         simplified_.gather_within(corners_part, std::min(distance, (stated - error) / kErrorInflation));
         work_ += m_.triangles.size();
         distance = measure_part(corners_part, enough, distance);
-        gather_after(t);
+        gather_simplified(t);
       }
       largest = std::max(largest, stated_error(distance, error));
     }
@@ -226,7 +226,7 @@ private:
   }
 
   /// Makes the simplified triangles around the points that t's corners became the candidates.
-  void gather_after(uint32_t t) {
+  void gather_simplified(uint32_t t) {
     const Triangle& p = in_.triangles[t].points;
     simplified_.gather({m_.stands_for[p.x], m_.stands_for[p.y], m_.stands_for[p.z]});
   }
@@ -302,8 +302,8 @@ private:
   // ---- from the simplified surface to lower levels
 
   /// Bounds the error of a simplified triangle. Goes back level by level while the bound exceeds limit().
-  double measure_after(uint32_t s, double stated) {
-    if (linked_.ends.empty()) linked_ = links_.by_after(m_.triangles.size());
+  double measure_simplified(uint32_t s, double stated) {
+    if (linked_.ends.empty()) linked_ = links_.by_simplified(m_.triangles.size());
     const Corners corners = simplified_.corners(s);
     const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - stated;
     const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + stated;

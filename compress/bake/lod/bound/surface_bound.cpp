@@ -76,7 +76,7 @@ private:
   double inherited_error(uint32_t source) const { return source_.surface().triangles[source].error; }
 
   /// Part of the simplified triangle lies within the distance of the source triangle.
-  void note_after(uint32_t simplified, uint32_t source, double distance) {
+  void note_simplified(uint32_t simplified, uint32_t source, double distance) {
     errors_[simplified] = std::max(errors_[simplified], stated_error(distance, inherited_error(source)));
     error_.largest = std::max(error_.largest, errors_[simplified]);
     link(source, simplified);
@@ -88,7 +88,7 @@ private:
 
   /// Parts of both triangles lie within the distance of each other.
   void note(uint32_t simplified, uint32_t source, double distance) {
-    note_after(simplified, source, distance);
+    note_simplified(simplified, source, distance);
     bounds_[source] = std::max(bounds_[source], stated_error(distance, inherited_error(source)));
   }
 
@@ -249,17 +249,17 @@ private:
     const Corners p = source_.corners(t);
     if (simplified_.candidates().empty())
       simplified_.gather_near(p[0]); // a degenerate triangle without connected neighbours
-    refine_over_after(t, bound, false);
+    refine_over_simplified(t, bound, false);
     if (!error_.enough(bound, inherited_error(t))) {
       simplified_.gather_within(p, bound);
-      refine_over_after(t, bound, true);
+      refine_over_simplified(t, bound, true);
     }
     accept(t);
   }
 
   /// @param all whether the candidates include every triangle that may be near enough; only then the corner distances
   /// are a valid lower bound
-  void refine_over_after(uint32_t t, double& bound, bool all) {
+  void refine_over_simplified(uint32_t t, double& bound, bool all) {
     refiner_.begin(simplified_);
     // Lower bound of the error against the current candidates.
     const double source = error_.proven,
@@ -295,7 +295,7 @@ private:
       if (linked.ends.empty()) linked = link_lists(links_, errors_.size()), source_.link();
       uncovered.measure(s, std::span(linked.source).subspan(linked.ends[s], linked.ends[s + 1] - linked.ends[s]));
     }
-    for (const PartDistance& part : uncovered.finish()) note_after(part.simplified, part.source, part.distance);
+    for (const PartDistance& part : uncovered.finish()) note_simplified(part.simplified, part.source, part.distance);
   }
 
   SimplifyMesh& m_;
@@ -321,7 +321,7 @@ private:
 
 } // namespace
 
-LinkLists SurfaceLinks::by_after(size_t count) const { return link_lists(links, count); }
+LinkLists SurfaceLinks::by_simplified(size_t count) const { return link_lists(links, count); }
 
 SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh) {
   return Measurer(points, triangles, mesh).run();

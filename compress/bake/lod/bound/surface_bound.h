@@ -13,7 +13,7 @@ struct SurfaceLink {
   bool operator==(const SurfaceLink&) const = default;
 };
 
-/// Source triangles linked to each simplified triangle s: before[ends[s] .. ends[s + 1]), possibly with duplicates.
+/// Source triangles linked to each simplified triangle s: source[ends[s] .. ends[s + 1]), possibly with duplicates.
 struct LinkLists {
   std::vector<uint32_t> ends, source;
 };
@@ -21,7 +21,7 @@ struct LinkLists {
 /// Where each source triangle lies on the simplified surface.
 struct SurfaceLinks {
   /// @param count number of simplified triangles
-  LinkLists by_after(size_t count) const;
+  LinkLists by_simplified(size_t count) const;
 
   std::vector<SurfaceLink> links; ///< may contain duplicates
   /// Per source triangle: maximum distance of what it stands for from the simplified triangles that it is linked to.

@@ -100,9 +100,9 @@ bool UncoveredBound::overlay(const Corners& part, double& stated) {
     return false;
   stated = 0.0;
   for (OverlayPiece& piece : mapped_triangles_) {
-    const double inherited = this->inherited(piece.triangle);
-    if (!error_.enough(piece.distance, inherited)) piece.distance = source_.overlay().nearest_distance(piece);
-    stated = std::max(stated, stated_error(piece.distance, inherited));
+    const double inherited_error = this->inherited_error(piece.triangle);
+    if (!error_.enough(piece.distance, inherited_error)) piece.distance = source_.overlay().nearest_distance(piece);
+    stated = std::max(stated, stated_error(piece.distance, inherited_error));
   }
   return true;
 }
@@ -112,12 +112,12 @@ bool UncoveredBound::overlay(const Corners& part, double& stated) {
 bool UncoveredBound::overlay_near(double& stated) {
   refined_.clear();
   if (!source_.overlay().overlay_near(
-          [&](uint32_t t, double distance) { return error_.enough(distance, inherited(t)); }, refined_))
+          [&](uint32_t t, double distance) { return error_.enough(distance, inherited_error(t)); }, refined_))
     return false;
   std::swap(mapped_triangles_, refined_);
   stated = 0.0;
   for (const OverlayPiece& piece : mapped_triangles_)
-    stated = std::max(stated, stated_error(piece.distance, inherited(piece.triangle)));
+    stated = std::max(stated, stated_error(piece.distance, inherited_error(piece.triangle)));
   return true;
 }
 
@@ -125,10 +125,10 @@ bool UncoveredBound::overlay_near(double& stated) {
 double UncoveredBound::refine() {
   refined_.clear();
   double stated = source_.candidates().empty() ? kInfinite : 0.0;
-  refiner_.run([&](double distance, uint32_t t) { return error_.enough(distance, inherited(t)); },
+  refiner_.run([&](double distance, uint32_t t) { return error_.enough(distance, inherited_error(t)); },
                [&](uint32_t t, double distance) {
                  refined_.push_back({t, 0, distance});
-                 stated = std::max(stated, stated_error(distance, inherited(t)));
+                 stated = std::max(stated, stated_error(distance, inherited_error(t)));
                });
   return stated;
 }

@@ -23,7 +23,7 @@ struct PartDistance {
 /// source triangle that may be near enough.
 class UncoveredBound {
 public:
-  /// @param before, after, error, refiner must outlive this object; `source` must be linked
+  /// @param source, simplified, error, refiner must outlive this object; `source` must be linked
   UncoveredBound(SurfaceSide& source, const SurfaceSide& simplified, GroupError& error, TriangleRefiner& refiner)
       : source_(source), simplified_(simplified), error_(error), refiner_(refiner) {}
 
@@ -44,7 +44,7 @@ private:
     bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : triangle > o.triangle; }
   };
 
-  double inherited(uint32_t source) const { return source_.surface().triangles[source].error; }
+  double inherited_error(uint32_t source) const { return source_.surface().triangles[source].error; }
   bool overlay(const Corners& part, double& stated);
   bool overlay_near(double& stated);
   double refine();

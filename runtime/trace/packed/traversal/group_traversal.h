@@ -7,7 +7,7 @@
 #include "runtime/trace/packed/kernels/leaf_tests.h"
 #include "runtime/trace/packed/kernels/node_children.h"
 #include "runtime/trace/packed/traversal/child_tests.h"
-#include "runtime/trace/packed/traversal/outside_search.h"
+#include "runtime/trace/packed/traversal/external_tree_search.h"
 
 /// Traces groups of rays through the tree over placements and through placed trees. A group visits a node together, as
 /// a 64-bit mask of rays, and the node test yields a mask per child of the rays that hit its box. A node is read and
