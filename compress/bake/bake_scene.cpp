@@ -1,7 +1,6 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <numeric>
 #include <optional>
@@ -11,9 +10,9 @@
 
 #include "compress/bake/bake_totals.h"
 #include "compress/bake/geometry_packer.h"
-#include "compress/bake/grid/float_spacing.h"
 #include "compress/bake/grid/geometry_measure.h"
 #include "compress/bake/grid/grid_choice.h"
+#include "compress/bake/grid/grid_warnings.h"
 #include "compress/bake/grid/scene_measure.h"
 #include "compress/bake/lod/shared_borders.h"
 #include "compress/bake/plan/geometry_plan.h"
@@ -173,33 +172,7 @@ private:
     if (choice.false_lattices > 0)
       warn(std::to_string(choice.false_lattices) +
            " meshes have positions off the lattice that they state; it is ignored");
-    uint64_t coarse = 0, far = 0;
-    for (size_t i = 0; i < grids_.size(); ++i) {
-      const GeometryMeasure& measure = measure_.geometries[i];
-      if (measure.bounds.empty()) continue;
-      const double step = grids_[i].grid.step();
-      coarse += measure.median_edge > 0.0 && step > measure.median_edge * kRoughEdge;
-      far += measure.float_step() > step;
-    }
-    if (coarse > 0)
-      warn(std::to_string(coarse) + " of " + std::to_string(grids_.size()) +
-           " geometries have a step above an eighth of their median edge; surfaces will look rough");
-    if (far > 0)
-      warn(std::to_string(far) + " of " + std::to_string(grids_.size()) +
-           " geometries lie so far from the origin that float positions are coarser than the step of their grid");
-    warn_of_coarse_floats();
-  }
-
-  /// Hit positions are world-space floats in every backend, and mesh positions are floats in mesh space; both lose
-  /// accuracy far from zero.
-  void warn_of_coarse_floats() {
-    constexpr double kMaxSpacing = 1.0 / 512.0; // of the scene's diagonal; pictures are right to 0.002 AO at half of it
-    const Bounds world = world_bounds(scene_);
-    if (world.empty()) return;
-    const double spacing = std::max(float_spacing(world), largest_mesh_spacing(scene_)), diagonal = world.diagonal();
-    if (diagonal > 0.0 && spacing > kMaxSpacing * diagonal)
-      warn("the scene lies so far from the origin that floats are " + brief(spacing) + " apart there, " +
-           brief(100.0 * spacing / diagonal) + " % of its diagonal; move it closer, or pictures will be wrong");
+    for (std::string& warning : grid_warnings(scene_, measure_, grids_)) warn(std::move(warning));
   }
 
   /// Leaves out instances that exceed the float range.

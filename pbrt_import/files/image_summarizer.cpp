@@ -8,6 +8,8 @@
 
 namespace packtrace {
 
+void fail_image(const std::string& why) { throw Error(ErrorKind::kInput, why); }
+
 void add_problem(ImageSummary& summary, uint64_t pixels, std::string_view of_one, std::string_view of_more) {
   if (pixels == 0) return;
   const std::string subject = pixels == 1 ? "1 pixel " : std::to_string(pixels) + " pixels ";

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -16,6 +17,9 @@ namespace packtrace {
 
 /// An upper bound for all formats: PNG reaches 8256; DWAB compression of EXR stores chunks in as few as 96 bytes.
 inline constexpr uint64_t kMaxPixelsPerByte = 1u << 16;
+
+/// Throws Error(kInput) with a message without file name.
+[[noreturn]] void fail_image(const std::string& why);
 
 /// Adds a problem that affects `pixels` pixels, in the singular or the plural; none if the count is 0.
 void add_problem(ImageSummary& summary, uint64_t pixels, std::string_view of_one, std::string_view of_more);

@@ -364,8 +364,7 @@ PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report
   return result;
 }
 
-/// Checks that there is at most one element each of vertices, faces and strips, that there are vertices, and that there
-/// are faces or strips. Throws Error(kInput).
+/// Throws Error(kInput) unless there are vertices and faces or strips, and each of these elements occurs at most once.
 void check_elements(const PlyHeader& header) {
   const auto rows = [&](std::string_view name) {
     const auto is_named = [&](const PlyElement& e) { return e.name == name; };

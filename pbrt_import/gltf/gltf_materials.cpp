@@ -180,6 +180,56 @@ void Materials::report_losses(const Value& material) {
     if (material.extension(name)) warn(std::string(name) + " is left out");
 }
 
+/// Sets how opaque the material is, and returns whether it transmits light.
+/// @param alpha of its base colour
+/// @param image of its base colour
+bool Materials::read_transparency(const Value& material, double alpha, const std::optional<Value>& image,
+                                  MaterialUse& use) {
+  const std::string mode = material.text_or("alphaMode", "OPAQUE");
+  const double cutoff = material.number_or("alphaCutoff", 0.5);
+  bool transmits = false;
+  if (mode == "MASK" || (mode == "BLEND" && image)) {
+    if (alpha <= 0.0 || (!image && alpha < cutoff))
+      use.absent = true;
+    else if (image)
+      use.opacity = define_image(*image, use, "opacity", static_cast<float>((mode == "MASK" ? cutoff : 0.5) / alpha));
+  } else if (mode == "BLEND") {
+    use.absent = alpha <= 0.0;
+    transmits = alpha < 0.5;
+  } else if (mode != "OPAQUE") {
+    material.fail("has the unknown alphaMode \"" + mode + "\"");
+  }
+  if (mode == "BLEND" && !use.absent && !transmits)
+    warn("blending is reduced to surfaces that are opaque where alpha is at least 0.5, with holes where it is less");
+  if (const std::optional<Value> transmission = material.extension("KHR_materials_transmission"))
+    transmits = transmits || transmission->number_or("transmissionFactor", 0.0) >= 0.5;
+  return transmits;
+}
+
+Vec3 Materials::read_emission(const Value& material) {
+  const std::optional<Value> strength = material.extension("KHR_materials_emissive_strength");
+  Vec3 emission = to_vec3(material.numbers_or("emissiveFactor", {0.0, 0.0, 0.0})) *
+                  static_cast<float>(strength ? strength->number_or("emissiveStrength", 1.0) : 1.0);
+  if (glm::any(glm::lessThan(emission, Vec3(0.0f)))) material.fail("emits negative light");
+  if (const std::optional<Value> glow = material.find("emissiveTexture"); glow && emission != Vec3(0.0f)) {
+    const std::string problem = problem_of([&] { emission *= image_average(*glow, true); });
+    warn(problem.empty() ? "textures of emission are reduced to their means"
+                         : "a texture of emission counts as white: " + problem);
+  }
+  return emission;
+}
+
+/// Returns the mean of the texture of metalness (z) and roughness (y); 1 without a texture.
+Vec3 Materials::roughness_and_metalness(const Value& base) {
+  Vec3 means(1.0f);
+  if (const std::optional<Value> gloss = base.find("metallicRoughnessTexture")) {
+    const std::string problem = problem_of([&] { means = image_average(*gloss, false); });
+    warn(problem.empty() ? "textures of metalness and roughness are reduced to their means"
+                         : "a texture of metalness and roughness counts as white: " + problem);
+  }
+  return means;
+}
+
 void Materials::define(const Value& material, MaterialUse& use) {
   const nlohmann::json empty = nlohmann::json::object();
   const Value base = material.find("pbrMetallicRoughness").value_or(Value(empty, material.path()));
@@ -198,39 +248,9 @@ void Materials::define(const Value& material, MaterialUse& use) {
     texture = use.name + ": product";
   }
 
-  const std::string mode = material.text_or("alphaMode", "OPAQUE");
-  const double alpha = factor[3], cutoff = material.number_or("alphaCutoff", 0.5);
-  bool transmits = false;
-  if (mode == "MASK" || (mode == "BLEND" && image)) {
-    if (alpha <= 0.0 || (!image && alpha < cutoff))
-      use.absent = true;
-    else if (image)
-      use.opacity = define_image(*image, use, "opacity", static_cast<float>((mode == "MASK" ? cutoff : 0.5) / alpha));
-  } else if (mode == "BLEND") {
-    use.absent = alpha <= 0.0;
-    transmits = alpha < 0.5;
-  } else if (mode != "OPAQUE") {
-    material.fail("has the unknown alphaMode \"" + mode + "\"");
-  }
-  if (mode == "BLEND" && !use.absent && !transmits)
-    warn("blending is reduced to surfaces that are opaque where alpha is at least 0.5, with holes where it is less");
-  if (const std::optional<Value> transmission = material.extension("KHR_materials_transmission"))
-    transmits = transmits || transmission->number_or("transmissionFactor", 0.0) >= 0.5;
-  const std::optional<Value> strength = material.extension("KHR_materials_emissive_strength");
-  use.emission = to_vec3(material.numbers_or("emissiveFactor", {0.0, 0.0, 0.0})) *
-                 static_cast<float>(strength ? strength->number_or("emissiveStrength", 1.0) : 1.0);
-  if (glm::any(glm::lessThan(use.emission, Vec3(0.0f)))) material.fail("emits negative light");
-  if (const std::optional<Value> glow = material.find("emissiveTexture"); glow && use.emission != Vec3(0.0f)) {
-    const std::string problem = problem_of([&] { use.emission *= image_average(*glow, true); });
-    warn(problem.empty() ? "textures of emission are reduced to their means"
-                         : "a texture of emission counts as white: " + problem);
-  }
-  Vec3 means(1.0f); // of roughness in y, of metalness in z
-  if (const std::optional<Value> gloss = base.find("metallicRoughnessTexture")) {
-    const std::string problem = problem_of([&] { means = image_average(*gloss, false); });
-    warn(problem.empty() ? "textures of metalness and roughness are reduced to their means"
-                         : "a texture of metalness and roughness counts as white: " + problem);
-  }
+  const bool transmits = read_transparency(material, factor[3], image, use);
+  use.emission = read_emission(material);
+  const Vec3 means = roughness_and_metalness(base);
   feed.begin("MakeNamedMaterial", document_.place(), {use.name});
   const bool unlit = material.extension("KHR_materials_unlit").has_value();
   std::string_view kind = "disney", parameter = "color";

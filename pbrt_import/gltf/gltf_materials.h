@@ -47,6 +47,9 @@ private:
   Vec3 read_average(uint64_t image, bool decode_srgb);
   std::string unique_name(const Value& material, size_t number);
   void report_losses(const Value& material);
+  bool read_transparency(const Value& material, double alpha, const std::optional<Value>& image, MaterialUse& use);
+  Vec3 read_emission(const Value& material);
+  Vec3 roughness_and_metalness(const Value& base);
   void warn(const std::string& text);
 
   Document& document_;

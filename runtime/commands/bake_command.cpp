@@ -135,23 +135,19 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
     output->write(scene.bytes);
     forget_resumed_levels(config, scene.report, diagnostics);
   }
-  const BakeReport& baked = scene.report;
   timings.bake_s = baking.seconds();
   display.finish();
   report_diagnostics(diagnostics, globals);
 
+  const BakeReport& baked = scene.report;
   if (json.wanted()) {
     nlohmann::json document = bake_json(options, baked, imported.statistics, timings, globals.verbosity > 0);
     if (!target.is_null()) document["target"] = target;
     json.write(document);
   }
-  const std::string promise = precision_warning(baked, config.precision_kind != PrecisionKind::kPicture);
-  if (json.to_stdout() || globals.quiet) {
-    print_printable(promise, stderr);
-    return 0;
-  }
-  print_results(output ? &*output : nullptr, baked, imported, timings, globals);
-  print_printable(promise, stderr);
+  if (!json.to_stdout() && !globals.quiet)
+    print_results(output ? &*output : nullptr, baked, imported, timings, globals);
+  print_printable(precision_warning(baked, config.precision_kind != PrecisionKind::kPicture), stderr);
   return 0;
 }
 

@@ -93,6 +93,47 @@ std::function<PrimaryCamera(uint32_t)> pixel_views(const Camera& camera, const S
   };
 }
 
+struct ProxyPicture {
+  const VoxelScene& scene;
+  const StillConfig& still;
+  const VoxelPicture& traced;
+  double seconds;
+
+  double mrays_per_s() const { return static_cast<double>(traced.rays) * 1e-6 / seconds; }
+};
+
+nlohmann::json picture_json(const RenderOptions& options, const ProxyPicture& picture) {
+  const auto& [scene, still, traced, seconds] = picture;
+  return {{"verb", "render"},
+          {"view", options.shade.view},
+          {"tap_error", traced.field_pixels > 0 ? nlohmann::json(traced.tap_error) : nlohmann::json()},
+          {"cone_error", traced.field_pixels > 0 ? nlohmann::json(traced.cone_error) : nlohmann::json()},
+          {"input", options.input},
+          {"outputs", options.outputs},
+          {"width", still.size.width},
+          {"height", still.size.height},
+          {"frames", still.frames},
+          {"supersample", still.supersample},
+          {"spp", still.ao.spp},
+          {"instances", scene.instance_count()},
+          {"instances_without_proxy", scene.instances_without_proxy()},
+          {"flat_instances", scene.flat_instances()},
+          {"resident_bytes", scene.resident_bytes()},
+          {"rays", traced.rays},
+          {"trace_s", seconds},
+          {"mrays_per_s", picture.mrays_per_s()}};
+}
+
+void print_picture(std::FILE* out, const ProxyPicture& picture) {
+  const auto& [scene, still, traced, seconds] = picture;
+  fmt::print(out, "proxies of {} instances ({} without), {} bytes resident; {} rays in {:.3f} s, {:.2f} Mrays/s\n",
+             scene.instance_count(), scene.instances_without_proxy(), scene.resident_bytes(), traced.rays, seconds,
+             picture.mrays_per_s());
+  if (traced.field_pixels > 0)
+    fmt::print(out, "mean difference of visibility from that of the rays: taps {:.3f}, cones {:.3f}\n",
+               traced.tap_error, traced.cone_error);
+}
+
 } // namespace
 
 bool views_proxies(const RenderOptions& options) {
@@ -132,34 +173,9 @@ int render_proxies(const RenderOptions& options, const GlobalOptions& globals) {
     print_printable(fmt::format("{}: warning: {} instances are not traced: flattened by their transform\n",
                                 options.input, scene->flat_instances()),
                     stderr);
-  const double rate = static_cast<double>(traced.rays) * 1e-6 / seconds;
-  if (json.wanted())
-    json.write({{"verb", "render"},
-                {"view", options.shade.view},
-                {"tap_error", traced.field_pixels > 0 ? nlohmann::json(traced.tap_error) : nlohmann::json()},
-                {"cone_error", traced.field_pixels > 0 ? nlohmann::json(traced.cone_error) : nlohmann::json()},
-                {"input", options.input},
-                {"outputs", options.outputs},
-                {"width", still.size.width},
-                {"height", still.size.height},
-                {"frames", still.frames},
-                {"supersample", still.supersample},
-                {"spp", still.ao.spp},
-                {"instances", scene->instance_count()},
-                {"instances_without_proxy", scene->instances_without_proxy()},
-                {"flat_instances", scene->flat_instances()},
-                {"resident_bytes", scene->resident_bytes()},
-                {"rays", traced.rays},
-                {"trace_s", seconds},
-                {"mrays_per_s", rate}});
-  if (json.to_stdout() || globals.quiet) return 0;
-  fmt::print(output.text_stream(),
-             "proxies of {} instances ({} without), {} bytes resident; {} rays in {:.3f} s, {:.2f} Mrays/s\n",
-             scene->instance_count(), scene->instances_without_proxy(), scene->resident_bytes(), traced.rays, seconds,
-             rate);
-  if (traced.field_pixels > 0)
-    fmt::print(output.text_stream(), "mean difference of visibility from that of the rays: taps {:.3f}, cones {:.3f}\n",
-               traced.tap_error, traced.cone_error);
+  const ProxyPicture picture{*scene, still, traced, seconds};
+  if (json.wanted()) json.write(picture_json(options, picture));
+  if (!json.to_stdout() && !globals.quiet) print_picture(output.text_stream(), picture);
   return 0;
 }
 

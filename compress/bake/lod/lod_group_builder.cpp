@@ -65,7 +65,7 @@ private:
 
   /// Lists, for each remaining triangle, the group's triangles that it may stand for.
   void list_below() {
-    const auto [ends, found] = links_.by_after(mesh_.triangles.size());
+    const auto [ends, found] = links_.by_simplified(mesh_.triangles.size());
     // per source triangle: the last triangle whose list it was added to
     std::vector<uint32_t> last(numbers_.size(), Wedge::kNone);
     for (const uint32_t s : order_) {

@@ -173,19 +173,9 @@ std::vector<ProxySummary> summarize_proxies(const BakedFile& file) {
   return result;
 }
 
-} // namespace
-
-FileSummary summarize(const BakedFile& file) {
+/// @param uses number of instances per geometry
+void add_geometries(FileSummary& summary, const BakedFile& file, std::span<const uint32_t> uses) {
   const BakedSections& s = file.sections();
-  FileSummary summary;
-  summary.trees = s.trees.size(), summary.nodes = s.nodes.size();
-  for (const baked::TreeRecord& tree : s.trees) summary.tree_depth = std::max(summary.tree_depth, tree.depth);
-  std::vector<uint32_t> uses(s.geometries.size());
-  for (const baked::InstanceRecord& instance : s.instances) {
-    ++uses[instance.geometry];
-    summary.placed_triangles += s.geometries[instance.geometry].triangle_count;
-    summary.placed_vertices += s.geometries[instance.geometry].vertex_count;
-  }
   std::vector<double> texels; // by material slot
   for (const uint32_t material : s.material_slots) texels.push_back(texels_per_uv(s, s.materials[material]));
   const std::vector<std::vector<uint32_t>> runs = material_runs(s);
@@ -208,11 +198,11 @@ FileSummary summarize(const BakedFile& file) {
   std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
     return std::tuple(!a.world_space, a.grid.step()) < std::tuple(!b.world_space, b.grid.step());
   });
-  add_materials(summary, s);
-  summary.requirements.assign(s.requirements.begin(), s.requirements.end());
-  for (const baked::TextureRecord& t : s.textures)
-    summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
-                                texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
+}
+
+/// Adds mesh sequences and level chains.
+/// @param uses number of instances per geometry
+void add_deformations(FileSummary& summary, const BakedSections& s, std::span<const uint32_t> uses) {
   for (const baked::DeformationRecord& d : deformation_records(s.deformation))
     summary.sequences.push_back({std::string(s.text(s.geometries[d.geometry].name)), d.frame_count, d.group_frames,
                                  d.frames_per_second, d.first_number, d.source_vertices, d.data_bytes,
@@ -225,6 +215,28 @@ FileSummary summarize(const BakedFile& file) {
       use.instances += uses[g];
     }
   }
+}
+
+} // namespace
+
+FileSummary summarize(const BakedFile& file) {
+  const BakedSections& s = file.sections();
+  FileSummary summary;
+  summary.trees = s.trees.size(), summary.nodes = s.nodes.size();
+  for (const baked::TreeRecord& tree : s.trees) summary.tree_depth = std::max(summary.tree_depth, tree.depth);
+  std::vector<uint32_t> uses(s.geometries.size());
+  for (const baked::InstanceRecord& instance : s.instances) {
+    ++uses[instance.geometry];
+    summary.placed_triangles += s.geometries[instance.geometry].triangle_count;
+    summary.placed_vertices += s.geometries[instance.geometry].vertex_count;
+  }
+  add_geometries(summary, file, uses);
+  add_materials(summary, s);
+  summary.requirements.assign(s.requirements.begin(), s.requirements.end());
+  for (const baked::TextureRecord& t : s.textures)
+    summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
+                                texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
+  add_deformations(summary, s, uses);
   summary.lod = summarize_lod(file);
   summary.proxies = summarize_proxies(file);
   summary.motion = summarize_motion(file);

@@ -33,16 +33,14 @@ inline Surfaces load(const SurfaceRow& row, int at) {
   return {load(row.disparity + at), load(row.normal_xy + at), load(row.normal_z + at)};
 }
 
-/// Guide weights of pairs of pixels in one direction. All lengths are divided by the number of pixels that they are
-/// apart, a power of two, which changes no rounding.
-/// @param scale 1 / that number
+/// Guide weights of pairs of pixels in one direction.
+/// @param scale 1 / distance of a pair in pixels: a power of two, so that scaling all lengths by it changes no rounding
 inline I32 guide_weights(const Surfaces& p, F32 rise_p, const Surfaces& q, F32 rise_q, float scale,
                          const GuideTerms& t) {
   const F32 difference = (q.disparity - p.disparity) * scale;
   const F32 distance = greater(magnitude(difference - rise_p), magnitude(difference - rise_q));
   const F32 nearer = lesser(p.disparity, q.disparity), least = nearer * (t.depth * scale);
-  // The flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette. There, their
-  // difference says nothing of a curvature, so it counts up to a limit.
+  // One of the slopes may be arbitrarily steep at a silhouette: uses the smaller one, and clamps the curvature term.
   const F32 allowed = least + lesser(magnitude(rise_p), magnitude(rise_q)) * t.slope +
                       lesser(magnitude(rise_p - rise_q) * t.bend, least * kMaxBend) + 1e-37f * scale;
   const F32 depth = greater(all(0.0f), 1.0f - distance / allowed);
@@ -176,8 +174,7 @@ struct Neighbours {
   }
 };
 
-/// Kernels of 16-bit values write this many. Pixels outside the image have a precision of 0, hence no distance and no
-/// weight, and remain so.
+/// Kernels of 16-bit values write this many. Pixels outside the image have a precision of 0, so their weights are 0.
 inline int whole_vectors(int width) { return (width + kLanes - 1) / kLanes * kLanes; }
 
 /// Replaces each value x by numerator / x.

@@ -139,6 +139,45 @@ void make_room(Buffer& scratch, const std::shared_ptr<Device>& device, uint64_t 
   scratch = Buffer(device, bytes, place, what);
 }
 
+struct PlacedStructures {
+  std::vector<VkAccelerationStructureInstanceKHR> placed;
+  std::vector<InstanceRecord> records; // one per placed structure
+};
+
+/// Returns an instance of each bottom level for each placement of its tree, in the order of the placements.
+/// @param structures by bottom level
+PlacedStructures placed_structures(std::span<const packed::TracePlacement> placements,
+                                   std::span<const BottomLevel> levels, std::span<const StructureNumber> structures,
+                                   const StructureMemory& memory) {
+  PlacedStructures result;
+  std::vector<uint32_t> by_tree(levels.size());
+  for (uint32_t i = 0; i < by_tree.size(); ++i) by_tree[i] = i;
+  std::ranges::stable_sort(by_tree, {}, [&](uint32_t i) { return levels[i].tree; });
+  for (uint32_t p = 0; p < placements.size(); ++p) {
+    const auto same =
+        std::ranges::equal_range(by_tree, placements[p].tree, {}, [&](uint32_t i) { return levels[i].tree; });
+    const VkTransformMatrixKHR transform = unit_from_grid(placements[p]);
+    for (const uint32_t i : same) {
+      VkAccelerationStructureInstanceKHR& instance = result.placed.emplace_back();
+      instance = {};
+      instance.transform = transform;
+      instance.mask = levels[i].ray_classes & 0xffu;
+      instance.flags = VK_GEOMETRY_INSTANCE_TRIANGLE_FACING_CULL_DISABLE_BIT_KHR;
+      instance.accelerationStructureReference = memory.address(structures[i]);
+      InstanceRecord record{};
+      record.placement = p;
+      uint32_t geometry = 0;
+      for (const BottomLevel::Part& part : levels[i].parts)
+        if (part.triangles > 0) {
+          record.first_range[geometry] = part.first_range;
+          record.range_count[geometry++] = part.range_count;
+        }
+      result.records.push_back(record);
+    }
+  }
+  return result;
+}
+
 } // namespace
 
 RayStructures::RayStructures(const GpuScene& scene, std::shared_ptr<StructureMemory> memory,
@@ -243,33 +282,7 @@ double RayStructures::copy(std::span<const CompactingCopy> copies) {
 void RayStructures::place(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
                           std::span<const StructureNumber> structures) {
   const std::shared_ptr<Device>& device = memory_->device();
-  std::vector<VkAccelerationStructureInstanceKHR> placed;
-  std::vector<InstanceRecord> records;
-  std::vector<uint32_t> by_tree(levels.size());
-  for (uint32_t i = 0; i < by_tree.size(); ++i) by_tree[i] = i;
-  std::ranges::stable_sort(by_tree, {}, [&](uint32_t i) { return levels[i].tree; });
-  for (uint32_t p = 0; p < placements.size(); ++p) {
-    const auto same =
-        std::ranges::equal_range(by_tree, placements[p].tree, {}, [&](uint32_t i) { return levels[i].tree; });
-    const VkTransformMatrixKHR transform = unit_from_grid(placements[p]);
-    for (const uint32_t i : same) {
-      VkAccelerationStructureInstanceKHR& instance = placed.emplace_back();
-      instance = {};
-      instance.transform = transform;
-      instance.mask = levels[i].ray_classes & 0xffu;
-      instance.flags = VK_GEOMETRY_INSTANCE_TRIANGLE_FACING_CULL_DISABLE_BIT_KHR;
-      instance.accelerationStructureReference = memory_->address(structures[i]);
-      InstanceRecord record{};
-      record.placement = p;
-      uint32_t geometry = 0;
-      for (const BottomLevel::Part& part : levels[i].parts)
-        if (part.triangles > 0) {
-          record.first_range[geometry] = part.first_range;
-          record.range_count[geometry++] = part.range_count;
-        }
-      records.push_back(record);
-    }
-  }
+  const auto [placed, records] = placed_structures(placements, levels, structures, *memory_);
   if (placed.size() > device->structure_limits().max_instances)
     throw Error(ErrorKind::kLimitExceeded, "backend gpu-rt: " + std::to_string(placed.size()) +
                                                " instances are more than an acceleration structure may have; use "

@@ -156,7 +156,7 @@ TEST_P(SurfaceBoundOf, EveryTriangleBeforeIsWithinItsBoundOfThoseLinkedToIt) {
 }
 
 TEST_P(SurfaceBoundOf, EveryTriangleAfterIsWithinItsErrorOfThoseLinkedToIt) {
-  const LinkLists linked = links_.by_after(s_.mesh.triangles.size());
+  const LinkLists linked = links_.by_simplified(s_.mesh.triangles.size());
   for (uint32_t s = 0; s < s_.mesh.triangles.size(); ++s)
     for (const DVec3& at : points_in(after_.corner(s, 0), after_.corner(s, 1), after_.corner(s, 2), 24)) {
       double least = 1e300;

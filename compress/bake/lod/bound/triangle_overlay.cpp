@@ -10,7 +10,7 @@
 namespace packtrace {
 namespace {
 
-constexpr double kSteep = 0.05;               // cosine; steeper triangles count as edge-on
+constexpr double kEdgeOn = 0.05;              // cosine; steeper triangles count as edge-on
 constexpr double kCoverageRounding = 1e-6;    // tolerance of the coverage, which is an integer
 constexpr double kMinCoverage = 1e-3;         // by the largest piece, of triangles that stick out over borders
 constexpr double kFullCoverage = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
@@ -86,7 +86,7 @@ bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std
   triangle_ = triangle, direction_ = z;
   const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
   double seen = glm::dot(normal, z);
-  if (!(std::abs(seen) > kSteep * glm::length(normal))) return false;
+  if (!(std::abs(seen) > kEdgeOn * glm::length(normal))) return false;
   if (seen < 0.0) std::swap(triangle_[1], triangle_[2]), seen = -seen; // seen from behind
   const DVec3 e1 = triangle_[1] - triangle_[0], e2 = triangle_[2] - triangle_[0];
   // p = triangle_[0] + l1 e1 + l2 e2 + height z
