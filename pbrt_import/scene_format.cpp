@@ -49,7 +49,7 @@ SceneFormat scene_format(const std::filesystem::path& file) {
     const std::string_view text(start.data(), size);
     if (text == "glTF") return SceneFormat::kGltf;
     if (text == "ply\n" || text == "ply\r") return SceneFormat::kPly;
-  } catch (const Error&) { // whoever reads the file reports the error
+  } catch (const Error&) { // the reader of the file reports the error
   }
   return SceneFormat::kPbrt;
 }

@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// A new, empty folder that only this object knows; it goes with all that is in it when the object does.
+/// A new, empty folder. The destructor removes it with its contents.
 class TemporaryFolder {
 public:
   /// @throws std::filesystem::filesystem_error where none can be made

@@ -98,7 +98,7 @@ struct BakeConfig {
 
   bool trees = true; ///< store trees over the clusters; otherwise they are built before tracing
 
-  ProxyConfig proxy; ///< stand-ins for far or small instances
+  ProxyConfig proxy; ///< proxies of far or small instances
 
   LodUse lod = LodUse::kOff;
   uint32_t lod_min_triangles = 128; ///< geometries with fewer triangles get no LOD levels
@@ -110,7 +110,7 @@ struct BakeConfig {
   /// take fewer bytes, but longer to reach.
   uint32_t sequence_group = 8;
 
-  /// Objects that stand for each other at different distances; an object belongs to one chain at most. Geometries of
+  /// Objects that replace each other by distance; an object belongs to one chain at most. Geometries of
   /// chains are stored even if no instance uses them.
   std::vector<LevelChain> level_chains;
 

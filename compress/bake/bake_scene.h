@@ -39,8 +39,8 @@ struct BakeReport {
   double source_area = 0.0;
   double collapsed_area = 0.0;   ///< source area of collapsed_triangles, with the same restriction
   uint64_t shared_shapes = 0;    ///< shapes outside objects that reuse the geometry of another shape
-  uint64_t instanced_shapes = 0; ///< shapes outside objects on a grid of their own, because they share a geometry
-  SeamSummary seams;             ///< seams of instances on grids of their own
+  uint64_t instanced_shapes = 0; ///< shapes outside objects with their own grid, because they share a geometry
+  SeamSummary seams;             ///< seams of instances on their own grids
   uint64_t shared_objects = 0;   ///< objects that reuse the geometry of another one
   uint64_t unused_objects = 0;   ///< never instanced, so not stored
   uint64_t unused_triangles = 0;
@@ -56,7 +56,7 @@ struct BakeReport {
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
   double max_uv_error_texels = 0.0;  ///< relative to the finest texture that the same geometry looks up
-  uint64_t lod_candidates = 0;       ///< geometries for which BakeConfig asks for LOD levels
+  uint64_t lod_candidates = 0;       ///< geometries for which BakeConfig requests LOD levels
   uint64_t lod_geometries = 0;       ///< geometries with LOD levels
   uint64_t resumed_geometries = 0;   ///< geometries whose LOD levels came from an interrupted bake
   std::vector<std::string> warnings; ///< also reported in the diagnostics

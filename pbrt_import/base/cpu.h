@@ -3,7 +3,7 @@
 namespace packtrace {
 
 /// Whether the processor has AVX2 and what always comes with it: FMA, BMI, BMI2, LZCNT and POPCNT (x86-64-v3). Kernels
-/// for it are compiled in files of their own, *_avx2.cpp, and are chosen at run time. They give the same results as the
+/// for it are compiled in separate files, *_avx2.cpp, and are chosen at run time. They give the same results as the
 /// portable ones.
 inline bool cpu_has_avx2() {
 #if defined(__x86_64__)

@@ -128,7 +128,7 @@ Descriptor create_nameless(const fs::path& folder) {
   return file;
 }
 
-/// Creates an empty file with a unique name, locked so that remove_stale_output() knows that it is in use.
+/// Creates an empty file with a unique name, locked so that remove_stale_output() detects that it is in use.
 Descriptor create_named(const fs::path& folder, const fs::path& target, fs::path& name) {
   for (int attempt = 0; attempt < kMaxNameAttempts; ++attempt) {
     name = new_temporary_name(folder);

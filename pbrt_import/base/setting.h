@@ -14,7 +14,7 @@ namespace packtrace {
 /// Which values of a setting's range are allowed.
 enum class SettingRule : uint8_t { kAny, kOdd, kPowerOfTwo };
 
-/// What users are told of a setting.
+/// Description of a setting for users.
 struct SettingInfo {
   std::string_view name;    ///< of the field, and of the setting on the command line
   std::string_view help;    ///< one sentence without a full stop; units included

@@ -20,7 +20,7 @@ public:
   /// File of a frame. Needs number >= 0.
   std::filesystem::path file(int64_t number) const;
 
-  /// Number of the frame that has this file name, without folders; nothing if no frame has it.
+  /// Number of the frame with this file name, without folders; nullopt if there is none.
   std::optional<int64_t> number_of(const std::string& file_name) const;
 
   /// The same files below a folder; an absolute pattern stays.

@@ -110,7 +110,8 @@ std::vector<uint32_t> alpha_bits(const uint8_t* alpha, size_t stride, size_t wid
   return bits;
 }
 
-/// Adds what alpha tells to a summary: the number of pixels where it is below 1 at 8 bits, and the mask of a cutoff.
+/// Adds values of the alpha channel to a summary: the number of pixels where it is below 1 at 8 bits, and the mask of a
+/// cutoff.
 /// @param alpha of the first pixel; that of the next is `stride` bytes behind it
 void add_alpha(ImageSummary& summary, const uint8_t* alpha, size_t stride, size_t width, size_t height,
                ImageWants wants) {

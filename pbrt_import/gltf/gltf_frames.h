@@ -19,8 +19,8 @@ public:
     std::vector<float> positions;            ///< without morph targets and skin, 3 per vertex
     std::vector<std::vector<float>> targets; ///< displacements of each morph target; empty if its weight is always 0
     std::vector<JointSet> joints;            ///< checked by check_joints()
-    std::vector<uint8_t> used;               ///< by vertex: whether the mesh of the scene has it
-    std::vector<double> mesh_weights;        ///< weights of morph targets in frames without weights of their own
+    std::vector<uint8_t> used;               ///< by vertex: whether the mesh of the scene uses it
+    std::vector<double> mesh_weights;        ///< weights of morph targets in frames without weights
   };
 
   /// @param name of the primitive, for messages

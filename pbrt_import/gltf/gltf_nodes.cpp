@@ -15,7 +15,7 @@ namespace {
 
 DVec3 to_dvec3(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
-/// The rotation of a quaternion x, y, z, w of any length; none if it has no length.
+/// The rotation of a quaternion x, y, z, w of any length; none if its length is zero.
 glm::dquat unit_rotation(double x, double y, double z, double w) {
   const glm::dquat q(w, x, y, z);
   const double length = glm::length(q);
@@ -31,7 +31,7 @@ DAffine local_map(const Value& node, const AnimatedValues& animated) {
   return compose_trs(local_parts(node, animated));
 }
 
-/// The roots of the document's scene; without scenes, all nodes that are nobody's child.
+/// The roots of the document's scene; without scenes, all nodes without a parent.
 std::vector<uint64_t> scene_roots(Document& document) {
   std::vector<uint64_t> roots;
   const size_t count = document.count("nodes");

@@ -36,7 +36,7 @@ std::vector<PlacedNode> place_nodes(Document& document, const Animation& animati
 std::vector<PlacedNode> nodes_at(Document& document, const Animation& animation, std::span<const PlacedNode> nodes,
                                  double time);
 
-/// Maps of the instances that EXT_mesh_gpu_instancing makes of a node; a single identity without it.
+/// Transforms of the instances of a node with EXT_mesh_gpu_instancing; a single identity without it.
 std::vector<DAffine> instances_of(Document& document, const Value& node);
 
 /// Translation, rotation (of unit length) and scale, which act in the reverse order.

@@ -42,7 +42,7 @@ private:
     Pose pose;
     bool deforms = false; ///< the animation moves its morph targets or its joints
     std::optional<NodeMotion> motion;
-    /// Whether the mesh is in an object of its own: it is deformed, and moves as a whole.
+    /// Whether the mesh is a separate object: it is deformed, and moves as a whole.
     bool alone() const { return !pose.empty() && motion.has_value(); }
   };
   void add_camera(size_t placed, uint64_t camera);

@@ -42,7 +42,7 @@ std::optional<Vec3> direction_of(const DAffine& map, DVec3 vector) {
   return Vec3(turned / length);
 }
 
-/// The nearest orthonormal matrix of a map, as far as its columns tell.
+/// The orthonormal matrix nearest to a map, by its columns.
 std::optional<glm::mat3> orthonormal(const DAffine& map) {
   glm::dmat3 m(map);
   for (int c = 0; c < 3; ++c) {

@@ -164,7 +164,7 @@ uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureP
     fill_recipe(recipe, kind, parameters);
     if (shading_) recipe.shading = shading_recipe(kind, parameters, recipe.metal, reduced);
   }
-  // Exporters for other renderers write "Normal"; pbrt knows "bumpmap" only.
+  // Exporters for other renderers write "Normal"; pbrt only has "bumpmap".
   for (const std::string_view map : {"normalmap", "Normal"})
     if (kind != "mix" && parameters.has(map)) recipe.flags |= kNormalMap;
   if (kind != "mix" && parameters.find_float("bumpmap")) recipe.flags |= kNormalMap;

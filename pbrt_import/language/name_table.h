@@ -19,7 +19,7 @@ public:
   /// Name that `name` is most likely a misspelling of; the alphabetically first if several are equally close; empty if
   /// none is. After a million comparisons in total it always returns empty, so that scenes with many mistakes are not
   /// slow.
-  /// @param visible tells by number which names may be suggested
+  /// @param visible by number: whether the name may be suggested
   std::string_view closest(std::string_view name, const std::function<bool(uint32_t)>& visible) const;
 
   /// @param number below size()

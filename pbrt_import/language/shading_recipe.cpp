@@ -159,7 +159,7 @@ private:
     note_texture(recipe_.roughness_u);
   }
 
-  /// @param common name of the parameter that stands for both if they are not given; empty: none
+  /// @param common name of the parameter that replaces both if they are not given; empty: none
   void two_roughnesses(float fallback, std::string_view common) {
     const Node both = common.empty() ? constant(fallback) : number(common, fallback);
     const std::optional<Node> u = parameters_.find_float("uroughness"), v = parameters_.find_float("vroughness");

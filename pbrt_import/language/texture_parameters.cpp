@@ -131,7 +131,7 @@ std::optional<Vec3> TextureParameters::rgb_from_file(const Parameter& parameter)
   } catch (const Error& error) {
     std::error_code ignored;
     if (metal_by_name(parameter.strings[0]) && !std::filesystem::exists(path, ignored))
-      return std::nullopt; // the caller knows this metal without the file
+      return std::nullopt; // the caller has the data of this metal
     context_.reporter.error(parameter.place, "cannot read spectrum file " + in_quotes(path.string(), kMaxShownPath) +
                                                  ": " + error.what());
     return std::nullopt;

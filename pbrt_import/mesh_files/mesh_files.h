@@ -17,7 +17,7 @@ class Reader;
 }
 
 /// Reads PLY, OBJ, STL and glTF files as the world of one scene, in their order. Their coordinates are scaled and
-/// turned as ImportOptions::mesh_scale and mesh_up say. Images within glTF files live as long as this object.
+/// turned according to ImportOptions::mesh_scale and mesh_up. Images within glTF files live as long as this object.
 class MeshFiles {
 public:
   MeshFiles(std::span<const std::filesystem::path> files, const MeshFileContext& context);

@@ -66,7 +66,7 @@ void cut_ears(const FlatPolygon& polygon, uint32_t corners, Triples& triangles) 
   size_t i = 1, tried = 0;
   while (left.size() > 3) {
     const size_t at = i % left.size();
-    // Without an ear the polygon crosses itself or has no area left: any corner will do.
+    // Without an ear the polygon crosses itself or has no area left, so any corner may be cut.
     if (tried < left.size() && !is_ear(polygon, left, at)) {
       ++i, ++tried;
       continue;

@@ -7,7 +7,7 @@
 namespace packtrace {
 
 /// Reads an STL file, binary or text: one shape with flat normals, whose equal corners become one vertex. The file's
-/// own normals are ignored, since the order of the corners says the same.
+/// own normals are ignored, since they follow from the order of the corners.
 /// @param file_number of the file in SourceFiles
 /// Throws Error(kInput) if the file cannot be read or is damaged; MemoryError; Error(kCancelled).
 /// Source: 3D Systems, StereoLithography Interface Specification, 1988.

@@ -35,7 +35,7 @@ public:
   LineWord peek();
   /// The next number of the line; none, without moving on, if the next word is not one.
   std::optional<float> number_word();
-  /// What is left of the line, without white space around it. Comments stay, since file names may contain #.
+  /// The rest of the line, without surrounding white space. Comments stay, since file names may contain #.
   std::string_view rest();
 
 private:

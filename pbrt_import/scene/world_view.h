@@ -6,7 +6,7 @@
 
 namespace packtrace {
 
-/// How people look at a world. Scenes do not say it; cameras tell it.
+/// Orientation from which a world is viewed. Scenes do not store it, so it is estimated from the cameras.
 struct WorldView {
   DVec3 up{0.0, 1.0, 0.0}; ///< a coordinate axis or its opposite
   bool mirrored = false;   ///< cameras mirror: the world is right-handed, pbrt's convention is left-handed

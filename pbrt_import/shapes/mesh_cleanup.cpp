@@ -166,7 +166,7 @@ void normals_from_faces(Mesh& mesh, const std::vector<uint8_t>& marked) {
   }
 }
 
-/// Normalises a normal; returns false and leaves it unchanged if it has no direction.
+/// Normalises a normal; returns false and leaves it unchanged if its length is zero.
 bool make_unit(Vec3& n) {
   constexpr float kUnitTolerance = 4e-7f; // for the squared length: a few roundings of a float unit vector
   if (std::abs(glm::dot(n, n) - 1.0f) <= kUnitTolerance) return true;

@@ -12,7 +12,7 @@ namespace packtrace {
 /// below 8 MiB.
 void prefer_large_pages(void* memory, size_t bytes);
 
-/// Asks for large pages for the small blocks that malloc returns to one thread. Page faults for 4 KiB pages take the
+/// Requests large pages for the small blocks that malloc returns to one thread. Page faults for 4 KiB pages take the
 /// kernel longer than most readers take to fill the pages.
 class LargeHeapPages {
 public:

@@ -22,7 +22,7 @@ inline constexpr uint32_t kNoInstance = ~0u;
 /// used for this.
 inline constexpr float kInvalidAo = -1.0f;
 
-/// Channels that a G-buffer may do without.
+/// Optional channels of a G-buffer.
 enum GBufferChannel : uint32_t {
   kAlbedoChannel = 1,
   kTriangleChannel = 2,

@@ -12,7 +12,7 @@ struct ColumnRow {
   uint32_t first, count;
 };
 
-/// Each function writes to out[0, row.count) what rays of a row hit, and for a miss the value of a miss.
+/// Each function writes values of the hits of a row to out[0, row.count), and the default value for misses.
 void write_depths(const RayColumns& columns, ColumnRow row, float* out);
 void write_numbers(const double (&from)[kMaxColumnRays], const RayColumns& columns, ColumnRow row, float* out);
 void write_vectors(const VectorColumns& from, const RayColumns& columns, ColumnRow row, Vec3* out);

@@ -8,8 +8,7 @@
 
 namespace packtrace {
 
-/// The distinct triangles that a batch of rays hit, in the order in which they were found. Each is decoded once,
-/// however many rays hit it.
+/// The distinct triangles that a batch of rays hit, in the order in which they were found. Each is decoded once.
 class HitTriangles {
 public:
   void clear() { count_ = 0; }
@@ -42,7 +41,7 @@ private:
   }
 
   uint32_t count_ = 0;
-  uint8_t found_[kMaxColumnRays]{}; ///< numbers by a hash of the triangle; is_on() tells whether they are right
+  uint8_t found_[kMaxColumnRays]{}; ///< numbers by a hash of the triangle; verified by is_on()
   RayHit hits_[kMaxColumnRays];     ///< one on each triangle
   HitSurface surfaces_[kMaxColumnRays];
   SurfaceQuery places_[kMaxColumnRays]; ///< of the hits

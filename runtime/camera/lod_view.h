@@ -12,9 +12,9 @@
 namespace packtrace {
 
 /// Returns the view for which screen-space errors are measured. Pixels are those of camera.size(). There is no near
-/// plane: distances are clamped to at least 1e-6 of the scene's diagonal. For orthographic cameras the distance must
-/// not matter, so everything counts as being as near as a point far outside the scene, and the allowed error is scaled
-/// accordingly.
+/// plane: distances are clamped to at least 1e-6 of the scene's diagonal. For orthographic cameras the error must not
+/// depend on the distance, so all points use the distance of a point far outside the scene, and the allowed error is
+/// scaled accordingly.
 /// @param error_px as in make_detail_view()
 /// @param world the scene's bounds
 /// Throws Error(kUsage) for an error out of range.

@@ -75,7 +75,7 @@ public:
     return false;
   }
 
-  /// Sets the pixel of the image that the first pixel of the G-buffer stands for.
+  /// Sets the pixel of the image that the first pixel of the G-buffer represents.
   void begin_at(uint32_t x, uint32_t y) { left_ = x, top_ = y; }
 
   void trace_tile(const Tile& tile) const {

@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// Motion per axis of points that the previous camera cannot project: it leads outside any image.
+/// Motion per axis of points that the previous camera cannot project: beyond any image.
 inline constexpr float kNoMotionPx = 1e9f;
 
 /// The previous shape of surfaces that deform.
@@ -32,7 +32,7 @@ public:
 /// @param ray of unit space
 bool approach_scene(CameraRay& ray);
 
-/// What motion is measured against. Everything referred to must live until trace_primary() returns.
+/// The previous frame, against which motion is measured. All references must stay valid until trace_primary() returns.
 struct PreviousFrame {
   const PrimaryCamera& camera; ///< the previous frame's
   /// The previous frame's transforms, by instance; empty: no instance moved.
@@ -51,15 +51,15 @@ void trace_primary(const SceneSource& source, const RayTracer& tracer, const Pri
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress,
                    const TextureFilter& textures = {});
 
-/// What a camera ray hit, as in GBuffer.
+/// The hit of a camera ray, with values as in GBuffer.
 struct CameraHit {
   Vec3 position{0};
   uint32_t instance = kNoInstance, triangle = 0, material = 0;
   bool back_face = false;
 };
 
-/// Traces the camera ray of a pixel again, with those of its tile, so that it hits what it hit in trace_primary().
-/// Returns none where it misses.
+/// Traces the camera ray of a pixel again, together with those of its tile, so that its hit equals that of
+/// trace_primary(). Returns none for a miss.
 std::optional<CameraHit> trace_pixel(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
                                      uint32_t x, uint32_t y);
 

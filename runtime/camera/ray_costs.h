@@ -9,7 +9,7 @@ namespace packtrace {
 
 class PackedTracer;
 
-/// What the search for the nearest hit of each camera ray visits, if the ray is traced alone. Rows top to bottom.
+/// Traversal costs of the nearest hit of each camera ray, if the ray is traced alone. Rows top to bottom.
 struct RayCosts {
   ImageSize size;
   std::vector<uint32_t> nodes, leaves; ///< of all trees

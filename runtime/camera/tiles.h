@@ -15,10 +15,9 @@ struct Tile {
   uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// Calls `work` for every tile of an image on all cores, in Morton order so that neighbouring tiles are close in time.
-/// Tiles at the right and lower edge may be smaller.
-/// The tiles are the same for any number of threads. Each finished tile advances progress by its pixels. Throws what
-/// `work` throws, and Error(kCancelled).
+/// Calls `work` for every tile of an image on all cores, in Morton order, so that neighbouring tiles are processed
+/// close in time. Tiles at the right and lower edge may be smaller. The tiles are the same for any number of threads.
+/// Each finished tile advances progress by its pixels. Throws what `work` throws, and Error(kCancelled).
 void for_each_tile(ImageSize size, ImageSize tile_size, Progress& progress,
                    const std::function<void(const Tile&)>& work);
 

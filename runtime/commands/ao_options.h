@@ -27,7 +27,7 @@ CLI::Option* add_word_option(CLI::App& verb, std::string_view name, std::string&
 /// Adds the options whose names begin with --ao. `options` must outlive the verb.
 void add_ao_options(CLI::App& verb, AoOptions& options);
 
-/// Sets what the options ask for. Throws Error(kUsage) for unknown names and values that are not allowed.
+/// Applies the options. Throws Error(kUsage) for unknown names and values that are not allowed.
 void apply(const AoOptions& options, FrameConfig& config);
 
 } // namespace packtrace

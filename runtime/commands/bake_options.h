@@ -16,7 +16,7 @@ namespace packtrace {
 
 inline constexpr std::array<const char*, 3> kPresets{"smallest", "balanced", "exact"};
 
-/// The --sequence of what a glTF file's animation deforms.
+/// Value of --sequence for the meshes that a glTF file's animation deforms.
 inline constexpr std::string_view kAnimationSequence = "animation";
 
 /// The options of `bake`.
@@ -57,7 +57,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options);
 /// Whether an option chooses the position grid.
 bool chooses_grid(const BakeOptions& options);
 
-/// Sets what the preset says and the user did not.
+/// Applies the preset to options that the user did not give.
 void apply_preset(BakeOptions& options);
 
 /// Throws Error(kUsage) for values out of range and contradictory options.

@@ -16,7 +16,7 @@ namespace packtrace {
 ///    still has its scene.
 ///  - `--size 640 360` becomes `--size 640x360`.
 ///  - An option name or a verb in place of an option's value is an error. Otherwise `--json --force` would write a file
-///    called "--force". `--json=--force` asks for exactly that.
+///    called "--force". `--json=--force` writes that file.
 /// Words after "--" are not changed.
 /// @param words the command line without the program's name
 /// Throws Error(kUsage).

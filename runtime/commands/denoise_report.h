@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// What is reported of a denoised picture.
+/// Report of a denoised picture.
 struct DenoisedRow {
   NumberedInput input;
   ImageSize size;
@@ -33,7 +33,7 @@ nlohmann::json denoise_json(const std::vector<DenoisedRow>& rows, const LayeredC
 /// @param details also the channels of the layers (-v)
 std::string denoise_text(const nlohmann::json& report, bool details);
 
-/// What users should know of a picture: values that are not finite, history that ended, motion that is missing. Empty
+/// Warnings about a picture: values that are not finite, history that ended, missing motion. Empty
 /// for most pictures.
 /// @param still LayeredConfig::still
 std::vector<std::string> picture_warnings(const DenoisedRow& row, bool sequence, bool still);

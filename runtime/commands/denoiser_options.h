@@ -15,7 +15,7 @@ namespace packtrace {
 /// @param settings out: words of the form NAME=VALUE
 void add_denoiser_options(CLI::App& verb, std::string& denoiser, std::vector<std::string>& settings);
 
-/// The configuration that the two options ask for; the default one with "off". Throws Error(kUsage) for unknown names,
+/// The configuration of the two options; the default one with "off". Throws Error(kUsage) for unknown names,
 /// values that are not allowed, and settings of a denoiser that is off.
 DenoiserConfig denoiser_config(const std::string& denoiser, const std::vector<std::string>& settings);
 

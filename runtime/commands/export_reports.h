@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// What reports of an export say of its files and settings.
+/// Files and settings in the reports of an export.
 struct ExportNames {
   std::string input, output;
   std::string profile, codec; ///< of glTF

@@ -11,8 +11,8 @@
 
 namespace packtrace {
 
-/// Calls a function in a thread of its own when files change on disk: their size or the time of their last change, once
-/// it is the same at two looks in a row.
+/// Calls a function in a separate thread when files change on disk: when their size or modification time has changed
+/// and is then equal in two consecutive checks.
 class FileWatch {
 public:
   /// @param changed gets the file's number; runs in the watching thread
@@ -35,7 +35,7 @@ private:
   };
   struct Watched {
     std::string file;
-    Version known, seen; ///< at the last call, and at the last look
+    Version known, seen; ///< at the last call, and at the last check
   };
   static Version version_of(const std::string& file);
   void loop();

@@ -24,7 +24,7 @@ size_t description_columns() {
   return std::clamp(columns, kMinColumns, kMaxColumns) - kNames - 1;
 }
 
-/// Wraps text between words to lines of at most that many columns. Longer words get a line of their own.
+/// Wraps text between words to lines of at most that many columns. Longer words get a separate line.
 std::string wrapped(const std::string& text, size_t columns) {
   std::string result;
   size_t column = 0;

@@ -25,7 +25,7 @@ struct LodOptions {
 void add_lod_options(CLI::App& verb, LodOptions& options);
 
 /// Throws Error(kUsage) for values out of range, contradictory options, and options that need --lod-error.
-/// @param measure compares the plan with separate cuts for all instances, for reports
+/// @param measure also compares the plan with separate cuts for all instances, for reports
 DetailConfig detail_config(const LodOptions& options, bool measure);
 
 /// Throws Error(kUsage) for a .pbrt scene or a file without LOD levels.

@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-/// Extensions that stand for a format. Generic ones (.txt, .bin) are not included.
+/// Extensions that identify a format. Generic ones (.txt, .bin) are not included.
 constexpr std::array<std::string_view, 41> kFormatEndings{
     ".ptk",  ".pbrt", ".json", ".v16", ".glb",   ".gltf", ".ply", ".obj", ".fbx",  ".stl", ".usd",
     ".usda", ".usdc", ".usdz", ".abc", ".blend", ".png",  ".exr", ".jpg", ".jpeg", ".tga", ".hdr",

@@ -18,8 +18,8 @@ struct ChosenCamera {
   std::string reason;            ///< why the scene is framed although --camera auto was not given; else empty
 };
 
-/// Chooses the camera that the options name; without --camera, camera 0, or one that frames the scene if it has none.
-/// Throws Error(kUsage) if there is no such camera.
+/// Returns the camera given by the options; without --camera, camera 0, or a camera that frames the scene if it has
+/// none. Throws Error(kUsage) if there is no such camera.
 ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals);
 
 /// Returns a camera that frames the whole scene, to replace a camera that sees nothing of it. Prints a warning.

@@ -9,7 +9,7 @@
 
 namespace packtrace {
 
-/// What `render` needs for stills and sequences: the scene, the camera, the settings and a frame loop.
+/// Scene, camera, settings and frame loop of `render`, for stills and sequences.
 struct RenderSetup {
   /// Loads the scene and prepares the frame loop.
   /// @param detail as in FrameConfig

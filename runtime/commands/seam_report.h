@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// Seams between instances with grids of their own and the geometry they touch, as JSON for `bake --json` and
+/// Seams between instances on their own grids and the geometry that they touch, as JSON for `bake --json` and
 /// `info --json` (docs/json_output.md).
 nlohmann::json seams_json(const SeamSummary& seams);
 

@@ -14,7 +14,7 @@ struct SequenceState {
   std::vector<std::byte> frame; ///< FrameLoop::save()
 };
 
-/// The file from which an interrupted sequence is resumed. It is written now and then and removed at the end.
+/// The file from which an interrupted sequence is resumed. It is written periodically and removed at the end.
 class SequenceCheckpoint {
 public:
   /// @param settings text that describes everything on which the pictures depend

@@ -24,7 +24,7 @@
 namespace packtrace {
 namespace {
 
-/// Seconds between two checkpoints unless --checkpoint says another. Work after the last one is repeated.
+/// Default of --checkpoint: seconds between two checkpoints. Work after the last one is repeated.
 constexpr double kCheckpointInterval = 10.0;
 
 /// The table of --csv, written line by line.

@@ -26,7 +26,7 @@ struct ShadeOptions {
 /// Adds --view, --exposure, --tone-map and --shade-set. `options` must outlive the verb.
 void add_shade_options(CLI::App& verb, ShadeOptions& options);
 
-/// Sets what the options ask for. Throws Error(kUsage) for unknown names and values that are not allowed, and for
+/// Applies the options. Throws Error(kUsage) for unknown names and values that are not allowed, and for
 /// options that have no effect.
 void apply(const ShadeOptions& options, FrameConfig& config);
 

@@ -25,7 +25,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint64_t kMaxScriptBytes = uint64_t{1} << 26;
-constexpr ImageSize kWindow{960, 540}; ///< unless --size says another
+constexpr ImageSize kWindow{960, 540}; ///< default of --size
 
 ImageSize view_size(const ViewOptions& options) {
   return options.render.size.empty() ? kWindow : parse_size(options.render.size);

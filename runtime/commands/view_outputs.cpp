@@ -40,7 +40,7 @@ void ViewOutputs::report(const nlohmann::json& result) {
   const bool json_to_stdout = globals_.json == "-";
   if (!globals_.quiet && !json_to_stdout)
     print_printable(result.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n");
-  std::fflush(stdout); // whoever reads along gets each line at once
+  std::fflush(stdout); // programs that read the output get each line at once
   results_.push_back(result);
 }
 

@@ -9,7 +9,7 @@
 
 namespace packtrace {
 
-/// Whether the options ask for a view of proxies.
+/// Whether the options select a view of proxies.
 bool views_proxies(const RenderOptions& options);
 
 /// Runs `render --view voxels`: a picture of a file's voxels, their colour times the share of occlusion rays that reach

@@ -22,7 +22,7 @@ struct CameraKey {
 /// @param base projection, screen window and film; its handedness is kept
 Camera camera_of_key(const CameraKey& key, const Camera& base);
 
-/// Returns what is wrong with a key and its predecessor: non-finite values, a time that does not ascend, a look at the
+/// Returns the problem of a key and its predecessor: non-finite values, a time that does not ascend, a look at the
 /// position, an up along the view, a field of view outside (0, 180). Empty if nothing is.
 std::string camera_key_problem(std::span<const CameraKey> keys, size_t index);
 

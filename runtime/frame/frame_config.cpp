@@ -52,7 +52,7 @@ uint32_t gbuffer_channels(const FrameConfig& config) {
   if (config.all_channels) return kAllChannels;
   uint32_t channels = 0;
   const bool albedo = config.shades() || (config.plain_layers & (kAlbedoLayer | kShadedLayer)) != 0;
-  if (albedo) channels |= kAlbedoChannel | kMaterialChannel;                         // materials tell emitters
+  if (albedo) channels |= kAlbedoChannel | kMaterialChannel;                         // to recognise emitters
   if (config.shades() || config.detail.only_occlusion) channels |= kBackFaceChannel; // for lift_origins()
   if (config.surface_layers) channels |= kTriangleChannel | kMaterialChannel;
   if (config.lod_layers) channels |= kTriangleChannel;

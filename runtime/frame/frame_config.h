@@ -22,17 +22,17 @@ enum class AoResolution : uint8_t {
 enum class AoRate : uint8_t {
   kFull,
   kCheckerboard, ///< every other pixel, alternating from frame to frame
-  kAdaptive,     ///< more for surfaces that came into view lately, fewer for others (runtime/ao/adaptive_rate.h)
+  kAdaptive,     ///< more for surfaces that recently came into view, fewer for others (runtime/ao/adaptive_rate.h)
 };
 
-/// What a frame computes besides ambient occlusion.
+/// Images that a frame computes besides ambient occlusion.
 enum class FrameView : uint8_t {
   kAo,
   kPbr,   ///< shading, with ambient light that nothing occludes (docs/shading.md)
   kPbrAo, ///< shading, with ambient occlusion
 };
 
-/// Layers of RenderedImage that may be left out, where no one looks at them, for their memory.
+/// Layers of RenderedImage that may be omitted to save memory.
 enum PlainLayer : uint32_t {
   kAoRawLayer = 1,
   kDepthLayer = 2,
@@ -98,7 +98,7 @@ struct FrameConfig {
   void validate() const;
 };
 
-/// The channels of the G-buffer (bits of GBufferChannel) that frames need for what they are asked to show.
+/// Returns the channels of the G-buffer (bits of GBufferChannel) that the configured layers and outputs need.
 uint32_t gbuffer_channels(const FrameConfig& config);
 
 /// Approximate memory of the G-buffer, the denoiser and the layers of a view.

@@ -21,11 +21,11 @@
 
 namespace packtrace {
 
-/// Renders a scene frame by frame: detail, camera rays, occlusion rays, denoising. It keeps what the next frame needs
-/// of the previous ones: history, trees, and, while nothing moves, the sums that antialias the image.
+/// Renders a scene frame by frame: detail, camera rays, occlusion rays, denoising. It keeps the state that the next
+/// frame needs: history, trees, and, while nothing moves, the sums that antialias the image.
 ///
-/// Everything that a window, a sequence or a still picture shows comes from this class. Frames depend on the settings,
-/// on the states of all frames since reset(), and on nothing else, in particular not on the number of threads.
+/// Windows, sequences and still pictures all use this class. Frames depend only on the settings and on the states of
+/// all frames since reset(), not on the number of threads.
 class FrameLoop {
 public:
   /// Throws Error(kUsage) for settings out of range, or a detail without a file; Error(kUnsupported) for shading
@@ -41,8 +41,8 @@ public:
   /// continues.
   const FrameReport& next_frame(const Camera& camera, double time_s, Progress& progress);
 
-  /// Whether the next frames are expected to move, too. Then what only a still picture needs is not kept from one to
-  /// the next: less memory, and the same results. A frame that does not move takes longer if one was expected to.
+  /// Sets whether the next frames are expected to move. Data that only a still picture needs is then freed: less
+  /// memory, same results. A frame that does not move although expected to takes longer.
   void expect_movement(bool expected) { expects_movement_ = expected; }
 
   /// Writes the layers of the frames so far.
@@ -50,15 +50,15 @@ public:
   /// @param report mean_history is set, and the denoiser's and the resolve's times are added
   void resolve(RenderedImage& image, PictureReport& report);
 
-  /// Returns what the next frame needs of the previous ones, for restore().
+  /// Returns the state that the next frame needs, for restore().
   std::vector<std::byte> save() const;
   /// Continues where a frame loop with the same scene and configuration was saved.
   /// @param camera, time_s those of the last frame
   /// Throws Error(kInput) for bytes that save() did not write, and as next_frame() does.
   void restore(const Camera& camera, double time_s, std::span<const std::byte> bytes);
 
-  /// Goes on with other settings, whose `detail` is not read: levels of detail stay as they are. All frames are
-  /// forgotten; trees are kept. Throws as the constructor does.
+  /// Continues with other settings, whose `detail` is ignored: levels of detail do not change. Discards all frames;
+  /// keeps the trees. Throws as the constructor does.
   void configure(const FrameConfig& config);
   /// Sets which layers are filled and which shaded view is resolved. Plain, surface and cost layers are filled from the
   /// next resolve() on, views from the next frame on. Traces the camera rays again where the G-buffer lacks what the
@@ -67,14 +67,14 @@ public:
 
   /// SceneState::follow_motion().
   bool follow_motion(const SceneMotion& motion) { return state_.follow_motion(motion); }
-  /// Goes on with lights that are turned otherwise (ShadeConfig::light_turn). Occlusion is kept; without a denoiser
-  /// shading begins anew, and with one its means are followed for a few frames (ShadedHistory::kChanged).
+  /// Changes the direction of the lights (ShadeConfig::light_turn). Occlusion is kept. Shading restarts without a
+  /// denoiser; with one its means continue for a few frames (ShadedHistory::kChanged).
   void turn_lights(float degrees);
 
   /// Number of occlusion pixels per frame.
   uint64_t frame_pixels() const;
 
-  /// Forgets all frames: the next one is number 0.
+  /// Discards all frames: the next one is number 0.
   void reset();
 
   const FrameConfig& config() const { return config_; }

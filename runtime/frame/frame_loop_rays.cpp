@@ -30,7 +30,7 @@ glm::dvec2 jitter_offset(uint32_t frame) {
   return {offset(3), offset(5)};
 }
 
-/// Side of the square of the image that a camera ray stands for in the textures' filter. Camera rays of a still view
+/// Side of the square of the image that a camera ray covers in the textures' filter. Camera rays of a still view
 /// share the pixel, so that its mean is as sharp as that of points.
 float FrameLoop::footprint_px() const {
   if (!config_.jitters()) return 1.0f;

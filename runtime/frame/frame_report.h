@@ -36,7 +36,7 @@ inline constexpr std::array<std::pair<const char*, double PassTimes::*>, 9> kPas
      {"upsample", &PassTimes::upsample_s},
      {"resolve", &PassTimes::resolve_s}}};
 
-/// What happened in a frame.
+/// Report of a frame.
 struct FrameReport {
   uint64_t number = 0; ///< from 0
   bool moved = true;   ///< false: camera and scene are those of the previous frame

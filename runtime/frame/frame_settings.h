@@ -21,7 +21,7 @@ struct WordSetting {
 /// viewer use it.
 std::span<const WordSetting> word_settings();
 
-/// The one with this name, which must exist.
+/// Returns the setting with this name, which must exist.
 const WordSetting& word_setting(std::string_view name);
 
 /// Numbers and switches of FrameConfig itself, but its size: supersample, jitter and exposure.

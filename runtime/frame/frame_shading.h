@@ -32,10 +32,10 @@ public:
   };
 
   /// Lights, materials and mip levels of textures, made at the first call.
-  /// @param memory pays for the levels; without it they are unlimited
+  /// @param memory reserves the memory of the levels; null: no limit
   /// Throws MemoryError.
   const ShadeScene& prepare(const SceneSource& source, const std::optional<MemoryBudget>& memory);
-  /// What prepare() made; null before.
+  /// Result of prepare(); null before.
   const ShadeScene* scene() const { return scene_.get(); }
 
   /// Shades what the camera rays hit, and adds it to the means. Returns the number of rays.
@@ -46,7 +46,7 @@ public:
   /// @param ao denoised, one value per traced pixel
   void resolve(const FrameConfig& config, const ShadedGuides* guides, std::span<const float> ao, RenderedImage& image);
 
-  /// The lights of the next frame are turned otherwise.
+  /// Must be called if the lights of the next frame are turned differently.
   void turn_lights() { lights_turned_ = true; }
   /// Forgets all frames.
   void clear() { mean_.clear(); }

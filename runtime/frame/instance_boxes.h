@@ -15,7 +15,7 @@ public:
   /// @param scene needed during this call only
   explicit InstanceBoxes(const FrameScene& scene);
 
-  /// Goes on to a frame.
+  /// Advances to a frame.
   /// @param source instances and the geometries that they show
   /// @param moving instances that have a pose, ascending
   /// @param pose their transforms
@@ -25,7 +25,7 @@ public:
   /// Forgets the frame before.
   void reset() { started_ = false; }
 
-  /// What the last follow() moved since the one before; also what changed its level by distance.
+  /// Boxes of the instances that the last follow() moved since the one before, or that changed their level by distance.
   std::span<const MovedBox> moved() const { return moved_; }
 
 private:

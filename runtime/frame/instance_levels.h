@@ -18,15 +18,15 @@ public:
 
   bool empty() const { return members_.empty(); }
 
-  /// Moves an instance before the next choose(); nothing for instances without levels.
+  /// Moves an instance before the next choose(). Has no effect on instances without levels.
   void move_instance(uint32_t instance, const Affine& world_from_object);
 
   /// An instance that changed its level.
   struct Change {
     uint32_t instance = 0, geometry = 0;
   };
-  /// Chooses levels for a frame. A level changes by at most one, so that what a frame shows was nearly there in the
-  /// frame before; the first frame after reset() has the right levels at once.
+  /// Chooses levels for a frame. A level changes by at most one per frame, so that successive frames show similar
+  /// surfaces; the first frame after reset() has the right levels at once.
   void choose(DVec3 eye);
   /// Forgets the frame before.
   void reset() { first_ = true; }
@@ -39,7 +39,7 @@ public:
   /// Sets the levels of a frame, from which the next choose() continues. Returns false, without a change, if these are
   /// not levels of the file's instances.
   bool set_levels(std::span<const uint8_t> levels);
-  /// What the last choose() or set_levels() changed.
+  /// Changes of the last choose() or set_levels().
   std::span<const Change> changes() const { return changes_; }
 
 private:

@@ -10,14 +10,15 @@
 
 namespace packtrace {
 
-/// Sums of what the camera rays of each traced pixel hit, over the jittered frames of a still view.
+/// Sums of the surfaces that the camera rays of each traced pixel hit, over the jittered frames of a still view.
 class MeanLayers {
 public:
   /// Forgets all frames.
   void clear() { frames_ = 0; }
 
   /// Adds a frame. Its size must be that of the other frames since clear(). The first frame takes no memory: it is read
-  /// from its G-buffer. Later frames need albedo and material if it has them; else there is no mean albedo.
+  /// from its G-buffer. Later frames need albedo and material if the first one has them; otherwise there is no mean
+  /// albedo.
   void add(const GBuffer& gbuffer, std::span<const Material> materials);
   /// Makes the sums of the first frame, before its G-buffer changes.
   void keep(const GBuffer& first);

@@ -18,7 +18,7 @@ class PackedTracer;
 class ProxyChoice;
 struct MovedBox;
 
-/// What a FrameLoop traces. Everything referenced must outlive it.
+/// The input of a FrameLoop. All references must outlive it.
 struct FrameScene {
   const SceneSource* source = nullptr;
   const BakedFile* file = nullptr; ///< the file that `source` reads; null for an imported scene
@@ -26,11 +26,11 @@ struct FrameScene {
   const SceneMotion* motion = nullptr; ///< of the instances; null: none moves
   bool deforms = false;                ///< plays the deforming meshes of `file`, again and again; backend packed only
   Bounds motion_bounds = {};           ///< of all moving instances at all times; empty: those of `motion`
-  std::optional<MemoryBudget> memory = {}; ///< pays for mip levels of textures; no limit without one
+  std::optional<MemoryBudget> memory = {}; ///< reserves the memory of mip levels of textures; null: no limit
 };
 
 /// A scene at the time of a frame, ready to be traced: places of instances, vertices of deforming meshes, levels by
-/// distance, levels of detail, and the tracers. Keeps what motion vectors need of the frame before.
+/// distance, levels of detail, and the tracers. Keeps the previous state for motion vectors.
 class SceneState {
 public:
   /// Throws Error(kUsage) for levels of detail without a file, Error(kUnsupported) for deforming meshes with another
@@ -38,11 +38,11 @@ public:
   SceneState(const FrameScene& scene, const DetailConfig& detail);
   ~SceneState();
 
-  /// Goes on with another motion of the same instances. Returns false, and changes nothing, if it moves others, or
-  /// beyond the bounds of the motion so far.
+  /// Replaces the motion. Returns false, without a change, if it moves other instances or leaves the bounds of the
+  /// motion so far.
   bool follow_motion(const SceneMotion& motion);
 
-  /// Goes on to the next frame. Returns whether something moved or changed since the one before.
+  /// Advances to the next frame. Returns whether something moved or changed since the previous one.
   /// @param eye chooses the levels by distance
   /// @param report receives times and rebuilt trees
   bool advance(DVec3 eye, double time_s, FrameReport& report);
@@ -53,20 +53,20 @@ public:
   /// Makes the tracer of level 0 if there is none.
   void build_level_0(FrameReport& report);
 
-  /// Chooses the instances that occlusion rays see as proxies, and makes their tracer if they changed. Then measures
-  /// the error of ambient occlusion, and leaves all of them triangles if it is larger than `most_error`.
+  /// Chooses the instances that occlusion rays see as proxies, and creates their tracer if they changed. Then measures
+  /// the error of ambient occlusion, and uses triangles for all of them if it exceeds `most_error`.
   /// @param seen, pixels as in ProxyChoice
   /// Throws Error(kUnsupported) without a file, or if something moves.
   void choose_proxies(const PrimaryCamera& view, const GBuffer& seen, double pixels, double most_error,
                       const AoConfig& ao, FrameReport& report);
-  /// What was measured for the instances that ProxyChoice chose last; nothing if it chose none.
+  /// The error measured for the last choice of ProxyChoice; none if it chose no instance.
   std::optional<double> proxy_error() const { return proxy_error_; }
 
   /// Forgets the frame before.
   void reset();
-  /// Returns what advance() depends on besides its arguments, for restore().
+  /// Returns the state on which advance() depends besides its arguments, for restore().
   std::vector<uint8_t> save() const;
-  /// Goes to a frame whose state was saved. Returns false if it was the state of another scene.
+  /// Restores a saved frame. Returns false if its state belongs to another scene.
   bool restore(double time_s, std::span<const uint8_t> saved, FrameReport& report);
 
   const FrameScene& scene() const { return scene_; }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kPasses = 4;
 constexpr float kLuminances = 3.0f;  ///< standard deviations by which neighbours may differ
-constexpr float kLongHistory = 4.0f; ///< frames from which a pixel's own samples tell its noise
+constexpr float kLongHistory = 4.0f; ///< frames from which on a pixel's own samples determine its noise
 constexpr float kFading = 8.0f;      ///< still frames from which the filter fades faster than the noise
 
 /// One of the two signals of a pixel, with the variance of the luminance of its mean.

@@ -9,7 +9,7 @@ namespace packtrace {
 
 /// Least albedo that direct light is taken relative to.
 inline constexpr float kDarkAlbedo = 0.02f;
-/// What direct light on an albedo is divided by, to be filtered or followed without its texture.
+/// Divisor that removes the albedo from direct light before filtering and reprojection.
 inline Vec3 light_base(Vec3 albedo) { return glm::max(albedo, Vec3(kDarkAlbedo)); }
 
 /// Surfaces of the traced pixels, which guide the filter. One entry per pixel.

@@ -53,7 +53,7 @@ LocalRange local_range(std::span<const Vec3> values, ImageSize size, uint32_t x,
 /// Moves the history of reflections into the range of the new frame around the pixel, where it lies farther away than
 /// noise explains. The noise is the larger of what the history and the new frame show: rare bright samples stay.
 void limit_specular(ShadedPixel& p, const ShadedFrame& frame, uint32_t x, uint32_t y) {
-  constexpr float kDeviations = 3.0f, kKnownNoise = 4.0f; // frames from which the history tells its noise
+  constexpr float kDeviations = 3.0f, kKnownNoise = 4.0f; // frames from which on the history determines its noise
   if (p.specular_frames < kKnownNoise) return;
   if (p.specular == Vec3(0.0f) && frame.specular[size_t{y} * frame.size.width + x] == Vec3(0.0f)) return;
   const LocalRange range = local_range(frame.specular, frame.size, x, y);

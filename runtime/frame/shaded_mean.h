@@ -13,7 +13,7 @@ namespace packtrace {
 
 struct ShadedGuides; // runtime/frame/shaded_filter.h
 
-/// What the frames of a traced pixel have in common.
+/// Accumulated shading of a traced pixel.
 struct ShadedPixel {
   Vec3 direct{0.0f}, specular{0.0f}, ambient{0.0f}; ///< means, linear sRGB radiance
   float direct_square = 0.0f;                       ///< mean of the squared luminance of `direct`
@@ -23,7 +23,7 @@ struct ShadedPixel {
   float ambient_frames = 0.0f;
 };
 
-/// How a frame continues the ones before.
+/// How a frame continues the previous ones.
 enum class ShadedHistory : uint8_t {
   kNone,       ///< it begins anew
   kSamePixels, ///< nothing has moved: plain means
@@ -40,9 +40,9 @@ public:
   /// Adds a frame of the same size as the others since clear(). Where something has moved, a pixel continues the means
   /// of the 2 x 2 pixels around the place where the frame before saw the same point (GBuffer::motion_px), as far as
   /// their instance, material, normal, depth and albedo agree. Direct light is taken relative to the albedo, so that
-  /// textures stay sharp. What is seen by reflection moves otherwise than the surface: its means follow for fewer
-  /// frames, and within three standard deviations of the noise around the mean of the new frame's 7 x 7 pixels. The
-  /// ambient light has no noise and begins anew. A pixel whose direct or specular light is not finite keeps its means.
+  /// textures stay sharp. Reflections move differently from the surface: their means follow for fewer frames, and
+  /// within three standard deviations of the noise around the mean of the new frame's 7 x 7 pixels. The ambient light
+  /// has no noise and begins anew. A pixel whose direct or specular light is not finite keeps its means.
   /// @param gbuffer of the frame, of which motion is read
   /// @return number of these pixels
   uint64_t add(const ShadedFrame& frame, const GBuffer& gbuffer, ShadedHistory history);
@@ -54,7 +54,7 @@ public:
   std::vector<std::byte> save() const;
   /// @return false if the bytes are not those of save() for that number of pixels
   bool restore(size_t pixels, std::span<const std::byte> bytes);
-  /// Keeps what the next frame that moves compares with; without it, that frame begins anew.
+  /// Keeps the surfaces that the next moving frame compares with; without them, that frame restarts.
   /// @param gbuffer of the last frame
   void keep_surfaces(const GBuffer& gbuffer);
 

@@ -16,7 +16,7 @@ inline constexpr std::array kSurfaceLayers{"material_flags", "cluster"};
 /// decoded before.
 inline constexpr std::array kCostLayers{"visited_nodes", "visited_leaves", "tested_triangles"};
 
-/// Writes what the first sub-pixel of each pixel that hits shows.
+/// Writes the surface of the first sub-pixel of each pixel that hits something.
 /// @param gbuffer camera rays of config.traced_size()
 /// @param source, traced the scene's source, and that of the camera rays' tracer
 void write_surface_layers(const FrameConfig& config, const GBuffer& gbuffer, const SceneSource& source,

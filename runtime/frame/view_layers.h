@@ -18,7 +18,7 @@ inline constexpr std::array kDenoiserViews{"variance", "history", "disocclusion"
 /// Intermediate results of tracing and denoising as layers of an image, for FrameConfig::view_layers.
 class ViewLayers {
 public:
-  /// Forgets the motion: since the last image nothing has moved.
+  /// Discards the motion, because nothing has moved since the last image.
   void clear() { motion_px_.clear(), previous_z_.clear(), moved_hits_.clear(); }
 
   /// Keeps the motion of a frame before which something moved.

@@ -27,22 +27,22 @@ struct DenoiserFrame {
   const DeviceView* view_on_device = nullptr; ///< has the values of all channels above but max_history, if it is set
 };
 
-/// Where the result goes, one entry per pixel. What is empty is not read back.
+/// Destination of the result, one entry per pixel. Empty spans are not read back.
 struct DenoiserResult {
   std::span<float> ao, variance, tspp;
 };
 
-/// A dispatch that has run.
+/// A completed dispatch.
 struct DenoiserDispatch {
   const char* name;
   double ms;                ///< on the device
-  uint32_t bytes_per_pixel; ///< that it must read and write, whatever the picture
+  uint32_t bytes_per_pixel; ///< that it reads and writes for any image
 };
 
 /// The passes of the default denoiser on a device, where its history stays. Not for several threads at once.
 class DeviceDenoiser {
 public:
-  /// What pipelines are made for.
+  /// Settings that pipelines are specialised for.
   struct Passes {
     uint32_t window_radius;    ///< FluxConfig::window / 2
     uint32_t normal_squarings; ///< of FluxConfig::reprojection_normal_power
@@ -56,8 +56,8 @@ public:
   /// Discards the history and allocates buffers. Throws Error(kLimitExceeded), and as Buffer does.
   void resize(uint32_t width, uint32_t height);
 
-  /// Adds a frame to the history. Returns its dispatches; nothing on CPU devices and
-  /// those without timestamps.
+  /// Adds a frame to the history. Returns its dispatches, or an empty list on CPU devices and devices without
+  /// timestamps.
   /// @param terms of the frame; terms.flags have kHasHistory unless the history is to be discarded
   std::vector<DenoiserDispatch> add(const DenoiseRecord& terms, const DenoiserFrame& frame);
   /// Filters a copy of the history.

@@ -26,7 +26,7 @@ struct DeviceTime {
 /// Camera and occlusion rays that are made on the device and never leave it. Not for several threads at once.
 class DeviceRays {
 public:
-  /// Called before each dispatch with the share of the call's work that is done; may throw.
+  /// Called before each dispatch with the completed fraction of the call's work; may throw.
   using Watch = std::function<void(double share)>;
 
   /// @param scene must outlive this object
@@ -65,7 +65,7 @@ public:
   /// Device memory of set_surfaces().
   uint64_t surface_bytes() const;
 
-  /// Uses other points, which lie on surfaces of the scene. Throws Error(kLimitExceeded) for more than 2^31.
+  /// Replaces the points, which lie on surfaces of the scene. Throws Error(kLimitExceeded) for more than 2^31.
   /// @param write writes all points; it must not read them
   void set_points(size_t count, const std::function<void(std::span<PointRecord>)>& write);
   /// Does the same with points that are there.
@@ -74,7 +74,7 @@ public:
   /// @param points.first, points.count are ignored
   void set_points(const DeviceView& picture, PicturePointsRecord points);
 
-  /// Counts for each point how many of its rays hit something. What the record says of points is ignored.
+  /// Counts for each point how many of its rays hit something. Ignores the points of the record.
   /// Throws Error(kUnsupported) if a kernel's loop ended early.
   DeviceTime count_occluded(const OcclusionRecord& samples, const Watch& watch = {});
   /// Sums visibility and distance of the nearest hits of each point's rays up, in the order of the samples.
@@ -105,7 +105,7 @@ public:
   void counts(std::span<uint32_t> out) const;
   /// By point, of sum_nearest(): visibility and distance, two each.
   void sums(std::span<double> out) const;
-  /// The rays of sample `samples.first_sample`; those of points without a surface hit nothing.
+  /// Returns the rays of sample `samples.first_sample`. Rays of points without a surface hit nothing.
   void occlusion_rays(const OcclusionRecord& samples, std::span<packed::KernelRay> out);
 
 private:

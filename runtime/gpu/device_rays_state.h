@@ -59,7 +59,7 @@ struct Occlusion {
   Pace pace[kSampleOrders];
 };
 
-/// What a DeviceRays has on its device.
+/// Buffers and kernels of a DeviceRays on its device.
 struct DeviceRays::State {
   explicit State(GpuScene::State& on_device) : scene(on_device), device(on_device.device) {}
 
@@ -120,7 +120,7 @@ struct DeviceRays::State {
       return device->run(kernel, push_bytes(span), groups_of(count));
     });
   }
-  /// Binds the scene's current buffers to the kernels, and drops those that were made for another kind of scene.
+  /// Binds the scene's current buffers to the kernels, and discards kernels that were made for another kind of scene.
   void follow_scene() {
     if (std::exchange(placed, scene.placed) == scene.placed) return;
     const bool same = std::exchange(constants, scene.constants) == scene.constants;

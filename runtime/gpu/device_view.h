@@ -31,7 +31,7 @@ public:
   /// are undefined.
   bool has_motion() const { return has_motion_; }
   void set_surfaces(bool made, bool moved) { has_surfaces_ = made, has_motion_ = moved; }
-  /// A plane that was read back.
+  /// Returns a plane that was read back.
   template <typename Value>
   std::span<const Value> plane(uint32_t number) const {
     return {reinterpret_cast<const Value*>(planes_.host().as<uint32_t>() + number * pixels_), pixels_};

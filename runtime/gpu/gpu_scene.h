@@ -16,7 +16,7 @@ class Device;
 class RayStructures;
 class StructureMemory;
 
-/// A scene's tables as they are uploaded. Needed only while they are.
+/// The tables of a scene to upload. Needed during the upload only.
 struct SceneTables {
   std::span<const baked::PackedNode> nodes; ///< of all trees
   std::span<const TreeRecord> trees;
@@ -47,14 +47,14 @@ public:
   void use_structures(std::shared_ptr<StructureMemory> memory, std::span<const RangeRecord> ranges);
   /// Null without use_structures().
   RayStructures* structures() const;
-  /// Traces these structures from now on; see RayStructures::place().
+  /// Replaces the traced structures; see RayStructures::place().
   void place_structures(std::span<const packed::TracePlacement> placements, std::span<const BottomLevel> levels,
                         std::span<const uint64_t> structures) const;
 
   /// Uploads the placements that changed, and the nodes of the tree over them that did.
   void replace_placements(const SceneTables& tables);
 
-  /// Bytes that the last upload of placements took.
+  /// Size of the last upload of placements in bytes.
   uint64_t uploaded_bytes() const;
 
   /// Finds nearest hits; see RayTracer::closest_hits().
@@ -64,7 +64,7 @@ public:
   /// Finds any hits; see RayTracer::any_hits().
   void any(std::span<const packed::KernelRay> rays, uint32_t ray_class, std::span<uint8_t> occluded) const;
 
-  /// Frees the memory for rays and hits, which is kept from call to call.
+  /// Frees the memory for rays and hits, which otherwise stays allocated between calls.
   void release_rays() const;
 
   std::string device_name() const;
@@ -78,7 +78,7 @@ public:
   bool validates() const;
 
   struct State;
-  /// For kernels beside those of spans of rays.
+  /// For kernels other than those of spans of rays.
   State& state() const { return *state_; }
 
 private:

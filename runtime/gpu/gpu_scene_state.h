@@ -22,7 +22,7 @@ struct RayKernelCode {
   std::span<const uint32_t> compute, rays;
 };
 
-/// What a scene has on its device.
+/// Buffers and kernels of a scene on its device.
 struct GpuScene::State {
   std::shared_ptr<Device> device;
   bool exact = false;

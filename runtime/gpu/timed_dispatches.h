@@ -20,7 +20,7 @@ struct Pace {
   /// Dispatches may grow to twice their size at once, and shrink to any.
   void adapt(uint64_t last_rays, double ms, double wanted_ms) {
     slowest_ms *= 0.8;
-    // Short dispatches do not fill the device: their time says little of longer ones.
+    // Short dispatches do not fill the device, so their time does not predict that of longer ones.
     if (ms > wanted_ms / 4) slowest_ms = std::max(slowest_ms, ms / static_cast<double>(last_rays));
     const double grown = 2.0 * static_cast<double>(last_rays);
     rays =

@@ -18,7 +18,7 @@
 
 namespace packtrace {
 
-// What the readers and writers of EXR files share; not for other code.
+// Shared code of the readers and writers of EXR files; not for other code.
 
 /// Reads a file in memory.
 class ExrMemoryReader : public Imf::IStream {

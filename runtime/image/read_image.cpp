@@ -21,7 +21,7 @@ void reserve_more(MemoryReservation& memory, uint64_t bytes, const std::filesyst
   with_file(path, [&] { memory.resize(memory.bytes() + bytes, what); });
 }
 
-/// What the header of a PNG file says. Nothing where decode_png() refuses the file for its size.
+/// The header of a PNG file; nullopt where decode_png() rejects the file for its size.
 ImageSize png_size(std::span<const std::byte> bytes) {
   constexpr size_t kWidthAt = 16, kHeightAt = 20;
   if (bytes.size() < kHeightAt + 4) return {};
@@ -39,7 +39,7 @@ ImageSize png_size(std::span<const std::byte> bytes) {
 LoadedImage read_image(const std::filesystem::path& path, std::string_view layer, const MemoryBudget& budget) {
   constexpr uint64_t kPngBytesPerPixel = 4 * (sizeof(float) + 2), kExrBytesPerSample = 2 * sizeof(float);
   MemoryReservation memory(budget);
-  std::error_code unknown; // read_file_bytes() says what is wrong with the file
+  std::error_code unknown; // read_file_bytes() reports the problem
   if (const uint64_t size = std::filesystem::file_size(path, unknown); !unknown)
     reserve_more(memory, size, path, "the file");
   const std::vector<std::byte> bytes = read_file_bytes(path);

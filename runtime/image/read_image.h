@@ -19,7 +19,7 @@ struct LoadedImage {
 
 /// Reads a PNG file (converted to linear values) or an EXR file. The format is detected from the first bytes.
 /// @param layer EXR layer, see choose_layer(). PNG files have no layers and accept only "" and "ao".
-/// @param budget pays for the file's bytes and the samples before they are allocated
+/// @param budget reserves the file's bytes and the samples before they are allocated
 /// Throws Error(kInput) for other formats, and like decode_png() and decode_exr(); MemoryError if the budget does not
 /// suffice.
 LoadedImage read_image(const std::filesystem::path& path, std::string_view layer = {},

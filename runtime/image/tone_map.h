@@ -6,7 +6,7 @@ namespace packtrace {
 
 enum class ToneMap { kSrgb, kAces };
 
-/// How radiance becomes display values.
+/// Conversion of radiance to display values.
 struct Exposure {
   ToneMap curve = ToneMap::kSrgb;
   float stops = 0.0f; ///< [-32, 32]: radiance is multiplied by 2^stops

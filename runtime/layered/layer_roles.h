@@ -12,7 +12,7 @@
 
 namespace packtrace {
 
-/// What a layer of a picture means to the denoiser.
+/// Role of a layer of an image in the denoiser.
 enum class LayerRole : uint8_t { kAo, kDepth, kNormal, kMotion, kPreviousDepth, kAlbedo, kId, kHitDistance };
 inline constexpr size_t kLayerRoleCount = 8;
 

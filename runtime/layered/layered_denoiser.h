@@ -28,11 +28,11 @@ struct LayeredConfig {
   bool view_layers = false; ///< fill the views of RenderedImage
 };
 
-/// Why a picture has no history of the pictures before it.
+/// Why the history restarts at a picture.
 enum class HistoryStart : uint8_t {
   kContinued, ///< it has one
   kFirst,     ///< there is no picture before it
-  kCut,       ///< the caller said so
+  kCut,       ///< requested by the caller
   kNewSize,   ///< the picture before it has another size
   kNewScene,  ///< less than a tenth of its surfaces are in the picture before it (shared_surfaces())
 };
@@ -56,7 +56,7 @@ public:
   LayeredDenoiser(const LayeredConfig& config, const MemoryBudget& budget);
 
   /// Reads and denoises the next picture. Throws like read_layered_picture().
-  /// @param cut forget the pictures so far
+  /// @param cut discard the history
   /// @return the result, valid until the next call
   const LayeredResult& next(const std::filesystem::path& file, bool cut);
 

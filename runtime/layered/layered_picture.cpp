@@ -166,7 +166,7 @@ LayeredPicture read_layered_picture(const std::filesystem::path& path, const Lay
                                     const MemoryBudget& budget) {
   const std::string name = path.string();
   MemoryReservation memory(budget);
-  std::error_code unknown; // read_file_bytes() says what is wrong with the file
+  std::error_code unknown; // read_file_bytes() reports the problem
   if (const uint64_t size = std::filesystem::file_size(path, unknown); !unknown)
     with_file(path, [&] { memory.resize(size, "the file"); });
   const std::vector<std::byte> bytes = read_file_bytes(path);

@@ -13,13 +13,13 @@
 
 namespace packtrace {
 
-/// What the values of a renderer's layers mean.
+/// Conventions of a renderer's layers.
 struct LayerConventions {
   /// Depths are distances along the camera's rays, not along its axis. [requires fov_degrees]
   bool ray_distance = false;
   /// Field of view of a perspective camera across the shorter image axis, as in pbrt, in degrees. (0, 180)
   std::optional<double> fov_degrees;
-  /// Depths from here on are background, as are 0, infinities and NaN. (0, infinity)
+  /// Depths of at least this value are background, and so are 0, infinities and NaN. (0, infinity)
   float far_depth = 1e9f;
   bool inverted_ao = false;      ///< 1 means fully occluded
   bool unsigned_normals = false; ///< components are stored as 0.5 + 0.5 n
@@ -66,7 +66,7 @@ struct LayeredReading {
 };
 
 /// Reads an EXR file with layers of any renderer.
-/// @param budget pays for the file, its samples, the converted layers and the denoiser before they are allocated
+/// @param budget reserves the file, its samples, the converted layers and the denoiser before they are allocated
 /// Throws Error(kInput) for files that cannot be read, are damaged or lack a required layer, Error(kUnsupported) for
 /// multi-part, deep and subsampled ones, and MemoryError.
 LayeredPicture read_layered_picture(const std::filesystem::path& path, const LayeredReading& reading,

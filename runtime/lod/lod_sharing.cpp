@@ -109,7 +109,7 @@ void LodSharing::choose_step(const Frame& frame, uint32_t number, size_t slot, c
   const std::span<const LodStep> steps = steps_[number];
   const auto last = static_cast<uint32_t>(steps.size()) - 1;
   choice.step = fine_step;
-  // Lower bound of its own cut's triangles: those left if all undecided groups pass.
+  // Lower bound of the triangles of its own cut: those that remain if all undecided groups pass.
   choice.own_triangles =
       std::min(steps[choice.step].triangles, geometry.triangles_of_prefix(geometry.ranks_up_to(need.allowed.far)));
   if (choice.own_triangles < steps[choice.step].triangles) {

@@ -13,7 +13,7 @@ namespace packtrace {
 /// An ambient occlusion image with the pixels that have a value.
 struct AoImage {
   Image image;                ///< one channel; 0 where there is no value
-  std::vector<uint8_t> valid; ///< per pixel: 1 if it has a value
+  std::vector<uint8_t> valid; ///< per pixel: 1 if its value is valid
 };
 
 /// Reads the layer "ao" of an EXR file. Throws like read_exr().

@@ -107,7 +107,7 @@ bool on_front(const json& point) {
   return truthy(at(flags, "default")) || !at(flags, "fronts").empty();
 }
 
-/// One way to shorten the data. `left_out` says what the page then lacks.
+/// A way to shorten the data. `left_out` describes what the page then lacks.
 struct Cut {
   const char* left_out;
   void (*apply)(json& points);
@@ -266,7 +266,7 @@ std::string page_with(const json& document) {
 std::string html_report(const json& report, const std::filesystem::path& folder, size_t max_bytes) {
   json document = report;
   round_numbers(document);
-  const size_t page_bytes = page_with(json::object()).size() + 1000; // and what the page says about missing parts
+  const size_t page_bytes = page_with(json::object()).size() + 1000; // and the text about missing parts
   const size_t data_bytes = max_bytes > page_bytes ? max_bytes - page_bytes : 0;
   const std::vector<std::string> left_out =
       cut_data(document, static_cast<size_t>(static_cast<double>(data_bytes) * kDataShare));

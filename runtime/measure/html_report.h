@@ -11,7 +11,7 @@ namespace packtrace {
 /// Returns report.html as text: one file without references to others. It holds the report as JSON, its pictures as
 /// data: URIs, and a Content-Security-Policy that allows the page's own style and script, by their SHA-256, and nothing
 /// else. If it would exceed `max_bytes`, first details of dominated points are left out, then pictures are reduced to a
-/// half or a quarter, then the least important pictures are left out; the page says so.
+/// half or a quarter, then the least important pictures are left out. The page lists what is missing.
 ///
 /// Text of the report may hold any bytes: markup is escaped, and bytes that are not UTF-8 become U+FFFD.
 /// @param report_json content of report.json (docs/measure.md); may lack any key

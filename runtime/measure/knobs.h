@@ -21,7 +21,7 @@ struct BakeKnobs {
   std::string normals = "auto";
   std::optional<double> normal_error; ///< degrees; with normals auto
   std::string uvs = "auto";
-  std::string textures; ///< empty: as the purpose says
+  std::string textures; ///< empty: the default of the purpose
   std::string codec = "none";
   std::string trees = "on";
   std::string lod = "off";

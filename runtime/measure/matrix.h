@@ -19,7 +19,7 @@ struct MeasurePoint {
   RenderKnobs render;
 };
 
-/// Properties of a scene that decide which points make sense, and at which values.
+/// Properties of a scene that determine the points and their values.
 struct MatrixScene {
   double diagonal = 1.0; ///< of the bounds, world units
   bool has_uvs = false;  ///< whether a mesh has texture coordinates

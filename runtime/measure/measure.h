@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// Everything that a measurement is made from.
+/// Input of a measurement.
 struct MeasureConfig {
   MatrixMode mode = MatrixMode::kDefault;
   MatrixScene matrix_scene;

@@ -19,11 +19,11 @@ std::string state_of(std::span<const std::filesystem::path> files);
 void write_json(const std::filesystem::path& file, const nlohmann::json& document);
 void write_text_file(const std::filesystem::path& file, const std::string& text);
 
-/// The folder of a measurement. Finished parts are files of their own, so that an interrupted measurement continues.
+/// The folder of a measurement. Each finished part is a separate file, so that an interrupted measurement continues.
 class MeasureFolder {
 public:
   /// Opens the folder of an earlier measurement, or creates it.
-  /// @param identity what a folder belongs to: the scene and the program's version
+  /// @param identity text that identifies the scene and the program's version
   /// @param force remove the parts of another identity instead of failing
   /// Throws Error(kIo) if the path is a file, if the folder has other content, belongs to another identity, or cannot
   /// be written.

@@ -20,8 +20,7 @@ struct NearestPoint {
 /// points.
 NearestPoint nearest_on_triangle(DVec3 p, DVec3 a, DVec3 b, DVec3 c);
 
-/// Triangles that can be asked for the point nearest to another one. Embree finds candidates in floats, distances are
-/// computed in double.
+/// Finds the nearest point on a set of triangles. Embree finds candidates in floats; distances are computed in double.
 class NearestSurface {
 public:
   /// Keeps references: the device and the spans must outlive it.

@@ -16,7 +16,7 @@
 
 namespace packtrace {
 
-/// What all points of a measurement have in common.
+/// Settings that all points of a measurement share.
 struct RunnerConfig {
   std::string scene;
   std::string identity; ///< text of the program's version and the state of the scene's files
@@ -37,7 +37,7 @@ struct RunnerConfig {
 /// Options of render for the knobs, with the denoiser if they use one, and the tracer in place of packed.
 Words render_words(const RenderKnobs& knobs, const RunnerConfig& config);
 
-/// A stage of a point that did not succeed.
+/// A failed stage of a point.
 struct StageFailure {
   std::string stage;
   ChildResult child;
@@ -48,7 +48,7 @@ nlohmann::json to_json(const StageFailure& failure);
 /// "failed", "killed" or "out-of-memory".
 std::string status_of(const StageFailure& failure);
 
-/// Measures points, each in processes of their own, and keeps the results in the folder. The file of the last bake is
+/// Measures points in separate processes, and keeps the results in the folder. The file of the last bake is
 /// kept for points that trace the same file.
 class PointRunner {
 public:

@@ -25,7 +25,7 @@ std::vector<WorldTriangle> world_triangles(const Scene& scene);
 /// edge functions in extended precision; edges belong to the triangle.
 double exact_distance(const CameraRay& ray, std::span<const WorldTriangle> triangles);
 
-/// How a case came out with default options. Counts are pixels or rays of the picture.
+/// Result of a case with default options. Counts are pixels or rays of the picture.
 struct StabilityResult {
   std::string name;
   uint32_t triangles = 0, pixels = 0, hits = 0; ///< hits: pixels that show a surface in double precision

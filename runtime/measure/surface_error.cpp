@@ -98,7 +98,7 @@ struct Surface {
 /// What the samples of one direction of a pair measure.
 struct Samples {
   std::vector<double> distance, degrees;
-  double area = 0.0; ///< that the samples stand for
+  double area = 0.0; ///< that the samples represent
 };
 
 uint64_t mixed(uint64_t x) { // splitmix64
@@ -164,7 +164,7 @@ double largest(const std::vector<double>& values) {
   return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
 }
 
-/// Mean of f over the samples of all pairs, weighted by the area that they stand for.
+/// Mean of f over the samples of all pairs, weighted by the area that they represent.
 template <class Function>
 double area_mean(std::span<const PairError> errors, Samples PairError::* side, std::vector<double> Samples::* values,
                  const Function& f) {

@@ -29,7 +29,7 @@ struct GeometryError {
   double max_normal_degrees = 0.0;
 };
 
-/// How a baked file's surfaces differ from those of its source.
+/// Differences between the surfaces of a baked file and those of its source.
 struct SurfaceError {
   SurfaceDistance to_packed; ///< from points of the source
   SurfaceDistance to_source; ///< from points of the packed surface

@@ -15,7 +15,7 @@ namespace packtrace {
 
 enum class TargetKind : uint8_t { kAoError, kPositionError, kNormalError, kSize };
 
-/// A limit that a file must keep.
+/// A limit that a file must satisfy.
 struct Target {
   TargetKind kind = TargetKind::kAoError;
   double limit = 0.0; ///< mean absolute AO error, object units, degrees, or bytes
@@ -29,11 +29,11 @@ Target parse_target(const std::string& text);
 /// Name of a kind on the command line.
 const char* name_of(TargetKind kind);
 
-/// What a point of a report measures for a target; none if it was not measured.
+/// The value of a point of a report that a target limits; none if it was not measured.
 std::optional<double> measured(const Target& target, const nlohmann::json& point);
 bool keeps(const Target& target, const nlohmann::json& point);
 
-/// What a search may change.
+/// The search space.
 struct TargetSearch {
   std::vector<Target> targets;
   BakeKnobs base;           ///< knobs that the search does not change, and starts from
@@ -54,7 +54,7 @@ struct TargetResult {
 TargetResult search_target(const TargetSearch& search,
                            const std::function<nlohmann::json(const BakeKnobs& knobs)>& measure);
 
-/// A table of what was tried, one line each, for people.
+/// A human-readable table of the tried points, one per line.
 std::string to_text(const TargetResult& result, std::span<const Target> targets);
 
 } // namespace packtrace

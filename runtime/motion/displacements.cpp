@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-/// The name that addresses one instance in a file of keys: NAME, or NAME#K if others have it too.
+/// The name that addresses one instance in a file of keys: NAME, or NAME#K if it is not unique.
 std::string key_name(const MotionTargets& targets, uint32_t instance) {
   const std::string& name = targets.instances[instance].name;
   const auto begin = targets.instances.begin();

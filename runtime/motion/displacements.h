@@ -13,7 +13,7 @@ struct Displacement {
   DVec3 world{0.0}; ///< world units from where it is at rest
 };
 
-/// The motion of displaced instances: what read_motion_keys() makes of displacement_keys().
+/// The motion of displaced instances: the result of read_motion_keys() for displacement_keys().
 /// @param displacements ascending by instance
 RigidMotion displacement_motion(std::span<const Displacement> displacements, const MotionTargets& targets);
 

@@ -13,7 +13,7 @@
 namespace packtrace {
 namespace {
 
-/// Follows the characters that the parser has taken. The parser does not tell places.
+/// Counts the characters that the parser has consumed, because the parser does not report positions.
 struct TextPlace {
   uint32_t line = 1, column = 1;             // of the next character
   uint32_t token_line = 1, token_column = 1; // begin of the last value, name or bracket that opens

@@ -25,7 +25,7 @@ struct JsonValue {
   double number = 0.0;
 };
 
-/// A JSON file whose values know their line and column, for messages.
+/// A JSON file that keeps the line and column of each value for messages.
 class JsonTree {
 public:
   /// Reserves memory in proportion to the file's size before it is read. Throws MemoryError, and Error(kInput) with

@@ -29,7 +29,7 @@ std::vector<Motion> merged(const std::vector<Motion>& old, std::vector<Motion> a
   return result;
 }
 
-/// Tracks that no one uses any more would lengthen the time span.
+/// Unused tracks would lengthen the time span.
 void drop_unused_tracks(RigidMotion& motion) {
   std::vector<uint32_t> numbers(motion.tracks.size(), kNoTrack);
   std::vector<MotionTrack> kept;

@@ -38,7 +38,7 @@ std::optional<std::array<double, kCount>> read_array(const JsonTree& json, const
   return numbers;
 }
 
-/// A rotation as the file gives it. Turns about an axis may exceed half a circle, which quaternions cannot tell.
+/// A rotation as the file gives it. Turns about an axis may exceed half a circle, which quaternions cannot represent.
 struct GivenRotation {
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
   std::optional<DVec3> axis;
@@ -72,7 +72,7 @@ GivenRotation read_rotation(const JsonTree& json, const JsonValue& value) {
   return given;
 }
 
-/// Refuses turns of half a circle and more about one axis: interpolation would take another way than the file says.
+/// Rejects turns of half a circle and more about one axis, because interpolation would turn the other way.
 void require_short_turn(const JsonTree& json, const JsonValue& value, const GivenRotation& before,
                         const GivenRotation& now) {
   const std::optional<DVec3> axis = now.axis ? now.axis : before.axis;

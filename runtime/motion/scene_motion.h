@@ -11,8 +11,8 @@
 
 namespace packtrace {
 
-/// The rigid motion of a scene's instances and cameras over time in seconds. Before the first key of a thing it stands
-/// as at its first key, and after the last one as at its last one, unless its track repeats.
+/// The rigid motion of a scene's instances and cameras over time in seconds. Before its first key and after its last
+/// one, an instance or camera keeps the pose of that key, unless its track repeats.
 class SceneMotion {
 public:
   SceneMotion() = default; ///< nothing moves

@@ -28,7 +28,7 @@ constexpr std::array<const char*, 6> kErrorKinds{"usage", "input", "unsupported"
 constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // by LodUse
 constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading"};
 
-/// Makes packtrace.Error and raises it for every Error.
+/// Defines packtrace.Error and raises it for every Error.
 void bind_errors(py::module_& module) {
   static py::exception<Error> type(module, "Error", PyExc_RuntimeError);
   py::register_exception_translator([](std::exception_ptr thrown) {

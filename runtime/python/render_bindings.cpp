@@ -48,7 +48,7 @@ Camera chosen_camera(const SceneSource& source, std::optional<int64_t> index, Im
   return source.cameras()[static_cast<size_t>(*index)];
 }
 
-/// What render() is told of the denoiser.
+/// The denoiser argument of render().
 struct DenoiserChoice {
   bool denoise = true;
   std::string preset;

@@ -45,7 +45,7 @@ struct Ggx {
   float lambda(Vec3 v) const;     ///< of Smith's functions
   float masking(Vec3 v) const { return 1.0f / (1.0f + lambda(v)); }
   float shadowing_masking(Vec3 o, Vec3 i) const { return 1.0f / (1.0f + lambda(o) + lambda(i)); }
-  /// A microfacet's normal in proportion to how large it is seen from o.
+  /// Samples a microfacet's normal in proportion to its projected area as seen from o.
   /// Source: Heitz, Sampling the GGX Distribution of Visible Normals, JCGT 2018.
   Vec3 visible_normal(Vec3 o, Vec2 u) const;
   /// Density over solid angle of reflected(o, visible_normal()).
@@ -55,7 +55,7 @@ struct Ggx {
 /// A surface at a hit, ready for shading: the record of its material with the albedo at the hit.
 struct ShadedSurface {
   SurfaceShading shading;
-  Vec3 diffuse{0.0f};      ///< colour of diffuse reflection without what specular reflection takes of it
+  Vec3 diffuse{0.0f};      ///< colour of diffuse reflection before the loss by specular reflection
   Vec3 specular{0.0f};     ///< factor of the Fresnel term, or its value at 0 degrees (kFresnelSchlick)
   Vec3 transmission{0.0f}; ///< factor
 

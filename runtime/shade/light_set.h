@@ -8,7 +8,7 @@
 
 namespace packtrace {
 
-/// Radiance of the white sky that stands for the lights of a scene without any. With the default ambient light, an
+/// Radiance of the white sky that replaces the lights of a scene without any. With the default ambient light, an
 /// open white surface is white.
 inline constexpr float kDefaultSky = 0.6f;
 
@@ -17,7 +17,7 @@ struct LightSample {
   Vec3 direction{0.0f};  ///< from the point to the light, unit length
   float distance = 0.0f; ///< world units; infinite for lights beyond the scene
   Vec3 radiance{0.0f};   ///< divided by the probability of the light; for points and directions: irradiance
-  float density = 0.0f;  ///< over solid angle; 0: from a single direction, which no ray meets by chance
+  float density = 0.0f;  ///< over solid angle; 0: from a single direction, which random rays never hit
 };
 
 /// All lights of a scene, to be sampled: the scene's lights and the triangles of its area lights, at rest.
@@ -27,7 +27,7 @@ public:
   /// @param source must outlive this object
   explicit LightSet(const SceneSource& source);
 
-  /// Whether the scene has no lights, so that the white sky stands for them.
+  /// Whether the scene has no lights and the white sky is used.
   bool uses_sky() const { return uses_sky_; }
   uint64_t triangle_count() const { return triangles_.size(); }
   size_t light_count() const { return lights_.size(); }

@@ -12,11 +12,11 @@
 
 namespace packtrace {
 
-/// What a scene's shading needs besides its surfaces: lights, and what is computed once per material.
+/// Data for shading a scene besides its surfaces: lights, and tables per material.
 class ShadeScene {
 public:
   /// @param source must outlive this object
-  /// @param memory pays for the mip levels
+  /// @param memory reserves the mip levels
   /// Throws MemoryError.
   explicit ShadeScene(const SceneSource& source, const std::optional<MemoryBudget>& memory = {});
 
@@ -26,7 +26,7 @@ public:
   const DirectionalAlbedo& albedo(uint32_t material) const { return albedos_[albedo_of_[material]]; }
   /// The textures with their mip levels.
   const TexturePyramids& textures() const { return textures_; }
-  /// What light may pass.
+  /// Kinds of surfaces that light may pass.
   Glass glass() const { return glass_; }
 
 private:

@@ -7,14 +7,14 @@
 
 namespace packtrace {
 
-/// What light may pass in a scene.
+/// Kinds of surfaces that light may pass in a scene.
 enum class Glass : uint8_t {
   kNone,    ///< nothing
   kClear,   ///< surfaces that occlusion rays do not meet (kTransmissive)
   kPartial, ///< also surfaces that occlude, such as those with an opacity between 0 and 1
 };
 
-/// Rays along which light comes to the surfaces of a tile, with what they carry.
+/// Shadow rays from the surfaces of a tile to lights, with the radiance that they carry.
 class ShadowRays {
 public:
   void clear() { rays_.clear(), carried_.clear(); }

@@ -38,7 +38,7 @@ std::string_view backend_name(const TracerConfig& config);
 /// Throws as StructureCache's constructor does.
 std::shared_ptr<StructureCache> make_structure_cache(const TracerConfig& config);
 
-/// Creates a tracer; the only function that knows all backends. Keeps references: source and file must outlive the
+/// Creates a tracer; the only function that refers to all backends. Keeps references: source and file must outlive the
 /// tracer.
 /// @param file the file that `source` reads, or null if it reads floats
 /// Throws Error(kUnsupported) for the backends packed and gpu without a file, and for gpu if it was not built; else as

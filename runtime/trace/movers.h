@@ -34,7 +34,7 @@ void check_moves(std::span<const uint8_t> movable, std::span<const uint32_t> ins
 /// @param lo, hi the box in the surface's coordinates
 bool within_traced_space(const DAffine& unit_from_surface, DVec3 lo, DVec3 hi);
 
-/// Throws Error(kUsage) that says that an instance would leave Movers::world too far behind.
+/// Throws an Error(kUsage) for an instance that would leave Movers::world too far.
 [[noreturn]] void throw_out_of_space(uint32_t instance);
 
 /// Returns the bounds of a source's instances and of all places of those that may move. Throws like placed_bounds().

@@ -9,7 +9,7 @@ namespace packtrace {
 /// Returns the placement of an instance whose surface is stored in unit space.
 Placement direct_placement(uint32_t instance, const DAffine& world_from_object);
 
-/// Returns the placement of an instance whose surface has coordinates of its own, into which the tracer transforms
+/// Returns the placement of an instance whose surface has its own coordinates, into which the tracer transforms
 /// rays.
 /// @param unit_from_surface must be invertible
 Placement instanced_placement(uint32_t instance, const DAffine& world_from_object, const DAffine& unit_from_surface);

@@ -5,7 +5,7 @@
 
 namespace packtrace {
 
-/// The part of a surface that a ray stands for, in the tracer's space: that within a cone about the ray. Source:
+/// The footprint of a ray on a surface, in the tracer's space: the part within a cone about the ray. Source:
 /// Amanatides, Ray Tracing with Cones, SIGGRAPH 1984.
 struct RayFootprint {
   Vec3 direction; ///< of the ray, unit length
@@ -16,7 +16,7 @@ struct RayFootprint {
 /// How the colours that camera rays see are filtered.
 struct TextureFilter {
   const TexturePyramids* pyramids = nullptr; ///< of the source; null: textures are looked up at points
-  float width_px = 1.0f;                     ///< side of the square of the image that a camera ray stands for
+  float width_px = 1.0f;                     ///< side of the square of the image that a camera ray covers
 };
 
 /// Returns the linear colour of a hit: the mean of the material's texture over the footprint, or its constant albedo.

@@ -35,7 +35,7 @@ struct DeviceSurfaces {
   float offset_scale;             ///< AoConfig::offset_scale
 };
 
-/// Points that are written where a tracer wants them.
+/// Writes points into memory of a tracer.
 struct OcclusionPoints {
   size_t count = 0;
   /// Writes points [first, first + out.size()). It may use all cores.

@@ -9,7 +9,7 @@
 
 namespace packtrace {
 
-/// What a pane's file consists of and what is traced of it, for a panel.
+/// Contents of a pane's file and memory for tracing it, for a panel.
 struct FileContents {
   using Rows = std::vector<std::pair<std::string, uint64_t>>;
   Rows streams;                  ///< bytes of the file by stream, without those that are empty; empty for a .pbrt scene

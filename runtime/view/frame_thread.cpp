@@ -238,7 +238,7 @@ void FrameThread::publish(double step_ms) {
   moved_ = s.last().moving;
 }
 
-/// Waits while there is nothing to do: the picture is as good as it gets, and nobody asks for anything.
+/// Waits while the picture has converged and there are no tasks.
 void FrameThread::wait_for_work() {
   std::unique_lock lock(mutex_);
   const bool finished = session_->last().still_frames >= kMaxStillFrames && !session_->changed() && !controls_->busy();

@@ -18,15 +18,14 @@
 
 namespace packtrace {
 
-/// What a window shows: the picture of a frame, and what the session and its controls were then.
+/// State that a window shows: the image of a frame, and the session and its controls at that time.
 struct ViewSnapshot {
   uint64_t number = 0; ///< of the published frame, from 1
   ImageSize size;      ///< of the picture: smaller than the view while something moves
   std::vector<uint8_t> rgb;
   ViewFrame frame;
   double frame_ms = 0.0; ///< wall time of the frame with its picture
-  /// When the first input came that this picture shows and none before did, as input_clock_s(); none: it shows no new
-  /// input.
+  /// Time of the oldest input that this image is the first to show, by input_clock_s(); none: it shows no new input.
   std::optional<double> input_s;
   std::vector<std::string> files;
   std::array<std::string, 2> layers;
@@ -46,15 +45,15 @@ struct ViewSnapshot {
 /// A clock for the time from an input to its picture, in seconds.
 double input_clock_s();
 
-/// Makes a session and renders its frames in a thread of its own, so that a window can answer meanwhile. Everything
-/// that changes the session runs in this thread between frames.
+/// Creates a session and renders its frames in a separate thread, so that a window stays responsive. Everything that
+/// changes the session runs in this thread between frames.
 class FrameThread {
 public:
   using Task = std::function<void(ViewSession& session, ViewControls& controls)>;
 
-  /// What the thread needs of the program.
+  /// Callbacks into the program.
   struct Host {
-    /// Makes the session. Its progress is to be reported to the observer, which ends it with Error(kCancelled) when the
+    /// Creates the session, and reports progress to the observer, which cancels by Error(kCancelled) when the
     /// FrameThread is destroyed.
     std::function<std::unique_ptr<ViewSession>(const Progress::Observer& observer)> load;
     /// Writes words as a command line.
@@ -64,21 +63,22 @@ public:
   };
 
   explicit FrameThread(Host host);
-  /// Ends the frame within a tile, and the thread.
+  /// Ends the thread, and the current frame within a tile.
   ~FrameThread();
   FrameThread(const FrameThread&) = delete;
   FrameThread& operator=(const FrameThread&) = delete;
 
-  /// What a task does to the frame that is being rendered.
+  /// Effect of a task on the frame that is being rendered.
   enum class Urgency : uint8_t {
     kAfterFrame, ///< waits for its end
     kMoves,      ///< ends it within a tile if it refines a still picture, which begins anew: for movements
     kNow,        ///< ends it within a tile
   };
 
-  /// Runs a task before the next frame. What it throws as Error becomes the message.
+  /// Runs a task before the next frame. The text of an Error that it throws becomes the message.
   void post(Task task, Urgency urgency = Urgency::kAfterFrame);
-  /// Runs a task that reads the picture: before, a frame is rendered if the picture does not show all that was posted.
+  /// Runs a task that reads the image. A frame is rendered first if the image does not show the effect of all posted
+  /// tasks.
   void post_reading(Task task);
   /// The pixel whose pick() the snapshots have; none: no pick.
   void set_pick(std::optional<std::array<uint32_t, 2>> pixel);
@@ -86,11 +86,11 @@ public:
   void show_contents(bool shown);
   /// Shows a message: what was saved, or why something failed. May be called from any thread.
   void set_message(const std::string& message);
-  /// Shows how far something is, until the next message. May be called from any thread.
+  /// Shows the progress of something until the next message. May be called from any thread.
   void set_status(const std::string& status);
   /// The last message or status.
   std::string message() const;
-  /// How far the making of the session is: its phase, and the finished part in [0, 1], 0 if that is unknown.
+  /// Progress of creating the session: its phase, and the completed fraction in [0, 1], 0 if unknown.
   std::pair<std::string, double> loading() const;
 
   /// The last frame that was published; null before the first.

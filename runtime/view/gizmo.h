@@ -20,8 +20,8 @@ struct Gizmo {
 /// @param centre in the camera's world
 std::optional<Gizmo> gizmo_at(DVec3 centre, const Camera& camera, ImageSize size);
 
-/// How far an arrow's instance moves if its arrow is dragged, world units along the arrow's axis. 0 for arrows that
-/// point at the camera.
+/// Distance by which an instance moves if its arrow is dragged, in world units along the arrow's axis. 0 for arrows
+/// that point at the camera.
 /// @param axis 0 to 2
 /// @param by fractions of the picture
 double dragged_distance(const Gizmo& gizmo, size_t axis, glm::dvec2 by, ImageSize size);

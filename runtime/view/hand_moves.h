@@ -15,14 +15,14 @@ class HandMoves {
 public:
   bool empty() const { return moved_.empty(); }
 
-  /// Moves an instance farther. Its own motion, if it has one, ends: it stands where it is at rest, and as far from
-  /// there as it was moved. Throws Error(kUsage) for an instance that cannot move, and for places beyond 1e30.
+  /// Moves an instance by an additional offset. Its own motion ends: it stays at its place at rest plus the sum of its
+  /// offsets. Throws Error(kUsage) for an instance that cannot move, and for places beyond 1e30.
   /// @param by world units
   void move(const ViewFile& file, uint32_t instance, DVec3 by);
-  /// Lets an instance stand or move as if it had not been moved.
+  /// Removes the offset of an instance.
   void put_back(const ViewFile& file, uint32_t instance);
 
-  /// The scene's motion with the instances where they were moved to; null if none was.
+  /// The scene's motion with the moved instances; null if no instance was moved.
   const std::shared_ptr<const SceneMotion>& motion() const { return motion_; }
   /// The centre of an instance's box at a time, relative to SceneSource::origin().
   DVec3 centre(const ViewFile& file, uint32_t instance, double time_s) const;
@@ -31,7 +31,7 @@ public:
   std::string keys_text(const ViewFile& file) const;
   /// The name of that file, for commands.
   const std::string& keys_file() const { return keys_file_; }
-  /// Says where keys_text() was saved. The next move forgets it.
+  /// Sets the file to which keys_text() was saved. The next move clears it.
   void set_keys_file(const std::string& name) { keys_file_ = name; }
 
 private:

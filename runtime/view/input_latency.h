@@ -11,7 +11,7 @@ public:
   void add(double ms);
   /// Number of inputs. Only the last ones count in percentiles.
   size_t count() const { return count_; }
-  /// The time that a fraction of the last inputs does not exceed; 0 without inputs.
+  /// Returns a quantile of the last times; 0 without inputs.
   /// @param fraction in [0, 1]
   double percentile_ms(double fraction) const;
 

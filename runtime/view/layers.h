@@ -8,7 +8,7 @@
 
 namespace packtrace {
 
-/// Which layers an image has besides the usual ones.
+/// Properties of an image that decide which layers it has.
 struct AvailableLayers {
   bool levels = false;   ///< camera rays use LOD levels
   bool denoiser = false; ///< it is denoised, by a frame loop

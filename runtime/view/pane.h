@@ -10,14 +10,14 @@
 
 namespace packtrace {
 
-/// What one half of a view shows.
+/// Contents of one half of a view.
 struct PaneState {
   size_t file = 0;          ///< number of the ViewFile
   std::string layer = "ao"; ///< a layer of view_layer_names()
   FrameConfig config;       ///< settings; its size and layers follow from the view, an AO radius of 0 from the scene
 
   bool ground_truth() const { return layer == kGroundTruth; }
-  /// What is rendered for the layer: shading for the layers of shaded images, ambient occlusion for all others.
+  /// Rendering mode for the layer: shading for layers of shaded images, else ambient occlusion.
   FrameView view() const;
   /// The layer of the image: "ao" for the ground truth, "pbr" for shading with occlusion.
   std::string image_layer() const { return ground_truth() ? "ao" : layer == kPbrAo ? "pbr" : layer; }
@@ -37,15 +37,16 @@ public:
     bool played = false;  ///< the scene moves
     /// HandMoves::motion() of the file.
     std::shared_ptr<const SceneMotion> by_hand;
-    /// Instances may be moved farther. The tracer's bounds are wide, so its last digits are not those of `render`.
+    /// Whether instances may be moved further. The tracer then uses wider bounds, and the last digits of results differ
+    /// from those of `render`.
     bool moving = false;
   };
   /// Throws like FrameLoop, and MemoryError.
   PaneRenderer(const Scene& scene, const FrameConfig& config, const MemoryBudget& budget);
 
-  /// Goes on with a scene. Returns false if that needs another renderer.
+  /// Continues with another scene. Returns false if that needs another renderer.
   bool follow(const Scene& scene);
-  /// Goes on with other settings. Returns whether the frames so far were forgotten, or the lights have turned.
+  /// Continues with other settings. Returns whether this discarded the frames so far or turned the lights.
   bool configure(const FrameConfig& config);
   /// Forgets all frames, as if none had been rendered.
   void restart();
@@ -65,7 +66,7 @@ public:
   const PictureReport& report() const { return report_; }
 
 private:
-  const void* owner_; ///< tells files apart
+  const void* owner_; ///< identifies the file
   bool played_;
   std::shared_ptr<const SceneMotion> by_hand_;
   bool wide_; ///< the tracer's bounds are not those of by_hand_

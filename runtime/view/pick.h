@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// What a picture shows in a pixel. Values of layers are those that `render` writes for the same picture.
+/// Information about a pixel. Values of layers equal those that `render` writes for the same image.
 struct Pick {
   uint32_t x = 0, y = 0;
   bool hit = false; ///< false: only x and y count

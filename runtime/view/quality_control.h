@@ -6,16 +6,16 @@
 
 namespace packtrace {
 
-/// Steps by which the frames of a moving view become cheaper: the resolution falls by eighths per axis to a half, then
-/// occlusion is traced for every other pixel, then for one of 2 x 2.
+/// Quality steps of the frames of a moving view, each cheaper than the one before: the resolution falls by eighths per
+/// axis to a half, then occlusion is traced for every other pixel, then for one of 2 x 2.
 inline constexpr uint32_t kCheapestStep = 6;
 
 /// The settings of a frame at a step; step 0 changes nothing. Sides are at least 1 pixel.
 FrameConfig at_quality_step(const FrameConfig& config, uint32_t step);
 
-/// Chooses the step from the times of the frames before, towards a time per frame. Two frames in a row that take more
-/// than 1.1 times the target go a step down, or several if one cannot suffice; 12 in a row that take less than 0.7
-/// times as long go a step up. A step loses the history, so steps are rare.
+/// Chooses the step from the times of previous frames, towards a target time. Two consecutive frames above 1.1 times
+/// the target lower the quality by a step, or by several if one cannot suffice; 12 consecutive frames below 0.7 times
+/// the target raise it by a step. A step discards the history, so steps are rare.
 class QualityControl {
 public:
   /// @param target_ms positive; 0: always step 0

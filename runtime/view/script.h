@@ -37,7 +37,7 @@ std::vector<ScriptLine> parse_script(std::string_view text, const std::string& n
 /// Throws Error(kInput), "NAME:LINE: problem".
 [[noreturn]] void fail_in_script(const std::string& name, uint32_t line, const std::string& problem);
 
-/// What a script needs of whoever runs it.
+/// Callbacks of a script into the program that runs it.
 class ScriptHost {
 public:
   virtual ~ScriptHost() = default;
@@ -52,7 +52,7 @@ public:
   virtual void report(const nlohmann::json& result) = 0;
 };
 
-/// Runs a script. Time passes at 60 frames per second, whatever a frame takes, so the results depend on the script
+/// Runs a script. Time advances by 1/60 s per frame regardless of the frame's duration, so results depend on the script
 /// alone, except for profiles and views with a target time per frame.
 /// @param name of the file, for messages
 /// Throws Error(kInput), "NAME:LINE: FIELD: problem", for values that are wrong or not possible; what

@@ -8,7 +8,7 @@
 
 namespace packtrace {
 
-/// A camera that people move. It is one of the scene's until the first movement, and a key from then on: position, the
+/// An interactive camera. It is one of the scene's until the first movement, and a key from then on: position, the
 /// point that it looks at, up and field of view. Keys are in world coordinates with 9 significant digits, so that the
 /// text of a key is the camera itself.
 class ViewCamera {
@@ -20,7 +20,7 @@ public:
   ViewCamera(const Camera& base, DVec3 origin, DVec3 up, double distance);
 
   const Camera& camera() const { return camera_; }
-  /// None while the camera is the base.
+  /// The key; none while the camera is the base.
   const std::optional<CameraKey>& key() const { return key_; }
   /// The key of the camera as it is, with time 0.
   CameraKey current_key() const;
@@ -29,8 +29,8 @@ public:
   void set(const CameraKey& key);
   /// Goes back to the base.
   void reset();
-  /// Takes the base, origin and up of another scene; the camera and its pivot stay where they are in the world. It is
-  /// the new base only if nothing moved and both bases are the same.
+  /// Adopts the base, origin and up of another scene, and keeps the camera and its pivot in place. The camera is the
+  /// new base only if it has not moved and both bases are equal.
   void change_scene(const ViewCamera& other);
   /// This camera in another scene that is seen from the same place.
   /// @param origin, base of the other scene, as for the constructor
@@ -41,8 +41,8 @@ public:
   /// Turns the view without moving the camera. Degrees to the right and upwards; the view stays at least a degree off
   /// the vertical.
   void look(double right_degrees, double up_degrees);
-  /// Turns the camera about its pivot: to its right for negative, upwards for negative angles, so that what it looks at
-  /// follows a mouse that moves right and down for positive ones.
+  /// Turns the camera about its pivot. Negative angles move it to its right and upwards, so that with positive ones the
+  /// object follows a mouse that moves right and down.
   void turn(double right_degrees, double up_degrees);
   /// Moves to a distance from which the whole box fits into the view, in the direction of the view.
   void frame(const Bounds& bounds);

@@ -122,7 +122,7 @@ bool ViewControls::moves_selected() const {
 ViewRequest ViewControls::press(std::string_view key, bool ctrl) {
   if (const ViewRequest request = view_request(key); request != ViewRequest::kNone) return request;
   const bool moves = std::ranges::find(kMoveKeys, key, &FlyKey::name) != kMoveKeys.end();
-  if (moves) session_.move_selected(DVec3(0.0)); // says at once if that is not possible
+  if (moves) session_.move_selected(DVec3(0.0)); // throws at once if that is not possible
   const bool held =
       moves || key == "shift" || key == "ctrl" || std::ranges::find(kFlyKeys, key, &FlyKey::name) != kFlyKeys.end();
   if (held)

@@ -20,7 +20,7 @@ struct KeyHelp {
 /// All keys and mouse actions of the viewer.
 std::span<const KeyHelp> key_help();
 
-/// What a key asks of whoever shows the view.
+/// Requests of keys to the program that shows the view.
 enum class ViewRequest : uint8_t { kNone, kScreenshot, kRecord, kProfile, kMenu, kHelp, kFullScreen, kQuit };
 
 /// The request of a key; kNone for all others.
@@ -36,7 +36,7 @@ public:
 
   /// A key goes down. Names are lower case: "w", "1", "space", "enter", "tab", "home", "pageup", "f9".
   /// @param ctrl the Ctrl key is down: stores a bookmark instead of going to it
-  /// Throws Error(kUsage) for a key without a meaning, with the closest name, and for what is not possible.
+  /// Throws Error(kUsage) for an unknown key, with the closest name, and for actions that are not possible.
   ViewRequest press(std::string_view key, bool ctrl = false);
   void release(std::string_view key);
   void release_all() { held_.clear(); }
@@ -45,7 +45,7 @@ public:
   /// Steps of the mouse wheel, upwards: faster.
   void wheel(double steps);
 
-  /// Lets time pass before a frame: held keys move the camera, and what plays goes on.
+  /// Advances time before a frame: held keys move the camera, and animations continue.
   void advance(double seconds);
   /// Whether the next frame moves without further input.
   bool busy() const { return ((orbits_ || plays_ || lights_turn_) && !paused_) || flies() || moves_selected(); }

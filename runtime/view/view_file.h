@@ -25,7 +25,7 @@ struct ViewFile {
   /// them.
   std::function<std::vector<std::pair<std::string, uint64_t>>()> stream_bytes;
   std::function<std::vector<std::string>()> geometry_names;
-  std::vector<std::string> words; ///< options of `render` that load the file so, such as --world 2
+  std::vector<std::string> words; ///< options with which `render` loads the file likewise, such as --world 2
   std::string base_camera = "0";  ///< `render --camera` that gives the camera to start from
 
   bool moves() const { return moving.motion != nullptr || moving.deforms; }

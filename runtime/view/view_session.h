@@ -19,14 +19,14 @@
 
 namespace packtrace {
 
-/// How a view shows its two panes.
+/// Arrangement of the two panes of a view.
 enum class SplitMode : uint8_t {
   kOff,        ///< the first pane alone
   kDivider,    ///< the first left of the divider, the second right of it
   kDifference, ///< their difference
 };
 
-/// What happened in a frame of a view.
+/// Report of a frame of a view.
 struct ViewFrame {
   bool moving = false;
   uint32_t still_frames = 0; ///< frames of the still picture, 0 while something moves
@@ -39,11 +39,11 @@ struct ViewFrame {
 /// The layers that a pane can show: those of `render --aov`, "ground_truth", and "pbr+ao".
 std::vector<std::string> view_layer_names();
 
-/// What a viewer shows, without a window: files, two panes, a camera, and a frame after another. While something moves,
-/// each frame continues the history of the one before, at a lower quality if QualityControl asks for it. Once nothing
-/// moves, a still picture begins: its N-th frame has the bytes that `render --frames N` writes for command().
+/// A viewer without a window: files, two panes, a camera, and successive frames. While something moves, each frame
+/// continues the history of the one before, at a lower quality if QualityControl chooses it. Once nothing moves, a
+/// still picture begins: its N-th frame has the bytes that `render --frames N` writes for command().
 ///
-/// Frames depend on the calls and nothing else, in particular not on the number of threads. Use it from one thread at a
+/// Frames depend on the calls only, not on the number of threads. Use it from one thread at a
 /// time.
 class ViewSession {
 public:
@@ -58,8 +58,8 @@ public:
   /// @param camera of the first file
   ViewSession(std::vector<ViewFile> files, ViewCamera camera, const Config& config);
 
-  // What is shown. Functions that change it restart the still picture if they change what is rendered; they throw
-  // Error(kUsage) for what is not possible, and then change nothing.
+  // State of the view. Setters restart the still picture if they change the rendered image. They throw Error(kUsage)
+  // for invalid values, without a change.
   const std::vector<ViewFile>& files() const { return files_; }
   /// Replaces a file, for example by its new content; camera and settings stay.
   /// @param start its own camera
@@ -82,7 +82,7 @@ public:
   /// @param target_ms in [0, 1e6]; 0: frames take the time that they need
   void set_target_ms(double target_ms);
   double target_ms() const { return quality_.target_ms(); }
-  /// Fixes the step of moving frames; none: QualityControl chooses.
+  /// Sets the quality step of moving frames; none: QualityControl chooses it.
   void fix_quality(std::optional<uint32_t> step);
   /// Begins the still picture again with the next frame.
   void restart() { restart_ = true; }
@@ -114,7 +114,7 @@ public:
   /// Moves the picked instance by world units. A scene that moves is shown at a time from then on. Throws Error(kUsage)
   /// if there is none, and if it cannot move.
   void move_selected(DVec3 by);
-  /// Lets the picked instance stand where it did.
+  /// Moves the picked instance back to its original place.
   void put_selected_back();
   /// The handles of the picked instance; none if it cannot be seen.
   std::optional<Gizmo> gizmo() const;
@@ -124,7 +124,8 @@ public:
   void drag_gizmo(size_t axis, glm::dvec2 by);
   /// The instances of a file that were moved.
   const HandMoves& hand_moves(size_t file) const { return hand_moves_[file]; }
-  /// Says where the keys of the moved instances of a file were saved (HandMoves::keys_text()), for command().
+  /// Sets the file to which the keys of the moved instances of a file were saved (HandMoves::keys_text()), for
+  /// command().
   void set_keys_file(size_t file, const std::string& name) { hand_moves_.at(file).set_keys_file(name); }
   /// Points the pivot at the surface in a pixel of the first pane. Returns false if there is none.
   bool set_pivot(uint32_t x, uint32_t y);
@@ -139,7 +140,7 @@ public:
   /// Renders a frame if something has changed since the last one, so that the picture shows it. Returns like step().
   bool settle(Progress& progress) { return moved_ || changed_ || last_.report.frames == 0 ? step(progress) : true; }
   const ViewFrame& last() const { return last_; }
-  /// Whether the next frame begins anew: something moved or was changed since the last one.
+  /// Whether the next frame restarts the image, because something moved or changed since the last one.
   bool changed() const { return moved_ || restart_ || changed_; }
   /// Reports how long the last moving frame took, for QualityControl.
   void add_frame_time(double ms) {

@@ -29,8 +29,8 @@ std::vector<ViewSetting> view_settings(const FrameConfig& config);
 /// allowed.
 void set_view_setting(FrameConfig& config, std::string_view name, std::string_view value);
 
-/// Whether frames of one can continue those of the other: all but what FrameLoop::show_layers() sets is the same. The
-/// levels of detail are not compared.
+/// Whether frames of one can continue those of the other: they differ at most in what FrameLoop::show_layers() sets.
+/// Levels of detail are not compared.
 bool same_frames(const FrameConfig& a, const FrameConfig& b);
 
 /// The options of `render` that give the default settings these values, one word each.

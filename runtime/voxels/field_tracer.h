@@ -21,7 +21,7 @@ public:
   /// @param has_sign whether distances inside are negative
   FieldTracer(const DistanceField& field, bool has_sign) : field_(&field), has_sign_(has_sign) {}
 
-  /// Sphere tracing: steps as far as nothing can be near, until the distance is below kSurface, or
+  /// Sphere tracing: advances by a safe distance until the distance is below kSurface, or
   /// kUnsignedSurface without signs, where interpolated distances do not reach 0 between samples.
   /// Source: Hart, "Sphere Tracing", 1996.
   /// The steps are floats from where the ray enters the field, however far its origin is.

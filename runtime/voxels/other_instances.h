@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// A source without the surfaces of some instances. All others keep their numbers.
+/// A scene source that hides some instances. The others keep their numbers.
 class OtherInstances final : public SceneSource {
 public:
   /// How an instance is left out.

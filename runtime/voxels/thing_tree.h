@@ -13,7 +13,7 @@
 
 namespace packtrace {
 
-/// A tree over the boxes of things, four boxes to a node. Boxes are tested in floats, widened by the rounding errors.
+/// A BVH over boxes with four children per node. Boxes are tested in floats, widened by the rounding errors.
 class ThingTree {
 public:
   ThingTree() = default;

@@ -17,7 +17,7 @@ struct VoxelPictureConfig {
   uint32_t seed = 0;    ///< of the occlusion rays
 };
 
-/// What a camera sees of voxels.
+/// An image of voxels.
 struct VoxelPicture {
   std::vector<Vec3> color;     ///< linear: mean of albedo times visibility of the rays that hit; 0 where none does
   std::vector<float> coverage; ///< share of a pixel's rays that hit

@@ -19,7 +19,7 @@ struct SceneVoxelHit {
   DVec3 normal{0.0};    ///< unit, world space, of the face that the ray enters through, towards the ray's origin
   uint32_t placed = 0;  ///< number among the scene's instances
   double edge = 0.0;    ///< length of a voxel along the normal, world units
-  DVec3 clearance{0.0}; ///< how far outside the surface rays start that leave it, world space
+  DVec3 clearance{0.0}; ///< offset of the origins of rays that leave the surface, world space
   Vec3 albedo{0.8f};    ///< linear; of the voxel's swatch if it has one
 };
 
@@ -28,8 +28,8 @@ struct FieldVisibility {
   float taps, cones;
 };
 
-/// Whether an instance's transform flattens it (see flattens()), or shrinks it to less than 2^-24 of the scene. Proxies
-/// do not stand for such instances.
+/// Whether an instance's transform flattens it (see flattens()), or shrinks it to less than 2^-24 of the scene. Such
+/// instances have no proxies.
 /// @param object, world bounds of the geometry and of the scene
 bool flattens(const DAffine& world_from_object, const Bounds& object, const Bounds& world);
 

@@ -14,7 +14,7 @@ class NodePath {
 public:
   explicit NodePath(const OccupancyStream& stream) : stream_(stream), last_(stream.levels() - 1) {}
 
-  /// Whether a voxel is set; if not, `shift` says how large the empty cell around it is.
+  /// Whether a voxel is set; if not, `shift` is the size of the empty cell around it.
   [[gnu::always_inline]] bool test(VoxelIndex v, uint32_t& shift) {
     const auto difference =
         static_cast<uint32_t>(std::bit_width((v[0] ^ before_[0]) | (v[1] ^ before_[1]) | (v[2] ^ before_[2])));

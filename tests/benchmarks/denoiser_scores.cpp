@@ -131,7 +131,7 @@ double flicker_of_truth(const DenoiserSequence& s) {
   return flicker.result();
 }
 
-/// What is left of an occluder that is gone.
+/// The ghost of an occluder that is gone.
 class Ghost {
 public:
   explicit Ghost(const DenoiserSequence& s)

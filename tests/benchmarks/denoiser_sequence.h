@@ -32,7 +32,7 @@ struct DenoiserSequence {
   std::string scene, motion;
   SequenceKind kind = SequenceKind::kStill;
   HistorySource source = HistorySource::kMotion;
-  /// What the denoiser is given; only the arrays that it reads. Frames without a G-buffer of their own (of size 0) have
+  /// Input of the denoiser: only the arrays that it reads. Frames without a separate G-buffer (of size 0) have
   /// that of the frame before, without motion.
   std::vector<GBuffer> gbuffers;
   std::vector<AoFrame> ao;

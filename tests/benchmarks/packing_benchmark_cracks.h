@@ -10,7 +10,7 @@ namespace packtrace {
 /// Counts equal source positions that differ after packing. Positions are the world shapes' positions in double.
 struct CrackCounts {
   uint64_t triangles = 0;               ///< triangles of the counted shapes
-  uint64_t instanced_shapes = 0;        ///< stored once for several placements, on grids of their own; not counted
+  uint64_t instanced_shapes = 0;        ///< stored once for several placements, on their own grids; not counted
   uint64_t shared_between_clusters = 0; ///< decoded positions used by several clusters
   uint64_t shared_between_meshes = 0;   ///< source positions used by several shapes
   uint64_t lost_triangles = 0; ///< source triangles that are not decoded where each corner's grid position puts them

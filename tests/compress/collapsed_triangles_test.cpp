@@ -154,7 +154,7 @@ TEST(CollapsedTriangles, SlotsWithoutTrianglesAreClosed) {
   Scene scene;
   for (const char* name : {"glass", "tube", "plate"})
     scene.materials.push_back({name, 0, Vec3(0.5f), kNoMask, kNoMask});
-  scene.materials[0].flags = kTransmissive; // a material class of its own
+  scene.materials[0].flags = kTransmissive; // a separate material class
   scene.meshes = {thin_tube(1e-4), test::grid_mesh(10), test::sphere_mesh(8)};
   scene.objects.push_back({"all",
                            {Shape{0, 1, false, DAffine(1.0)}, Shape{1, 2, false, DAffine(1.0)},

@@ -1,4 +1,4 @@
-// What opening a file says of damaged levels of detail.
+// Errors on opening files with damaged levels of detail.
 
 #include <cmath>
 #include <cstddef>

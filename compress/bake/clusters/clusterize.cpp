@@ -217,7 +217,7 @@ private:
   std::vector<std::array<uint32_t, 3>> neighbours_;
   std::vector<uint8_t> taken_;
   std::vector<uint32_t> place_;     ///< per triangle: place in the frontier, or kNone
-  std::vector<uint32_t> vertex_in_; ///< per vertex: the last cluster that has it
+  std::vector<uint32_t> vertex_in_; ///< per vertex: the last cluster that contains it
   Frontier frontier_;
   uint32_t cluster_ = 0, cursor_ = 0, size_ = 0, vertices_ = 0;
   DVec3 sum_{0.0};

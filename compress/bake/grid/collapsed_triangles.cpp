@@ -94,13 +94,13 @@ private:
 
   const std::span<const Triangle> triangles_;
   const std::span<const uint8_t> shapes_;
-  std::vector<uint8_t> at_sliver_;     // per point: whether a sliver has it
+  std::vector<uint8_t> at_sliver_;     // per point: whether it is a corner of a sliver
   std::vector<uint32_t> slivers_;      // triangle numbers
   std::vector<uint32_t> joined_;       // per sliver: parent in the union-find forest of pieces
   std::vector<Edge> edges_;            // edges of slivers, ascending
-  std::vector<uint32_t> sliver_at_;    // per edge: a sliver that has it
-  std::vector<uint8_t> odd_;           // per edge: whether an odd number of slivers has it
-  std::vector<uint8_t> has_neighbour_; // per edge: whether a triangle with area has it
+  std::vector<uint32_t> sliver_at_;    // per edge: a sliver with this edge
+  std::vector<uint8_t> odd_;           // per edge: whether it belongs to an odd number of slivers
+  std::vector<uint8_t> has_neighbour_; // per edge: whether it belongs to a triangle with area
 };
 
 } // namespace

@@ -63,7 +63,7 @@ private:
   bool is_stated(size_t g) const { return !stated_.grids.empty() && stated_.grids[g].has_value(); }
   bool is_empty(size_t g) const { return measure_.geometries[g].bounds.empty(); }
 
-  /// Chooses the grids that config asks for, including finer ones for small things.
+  /// Chooses the grids according to config, including finer ones for small geometries.
   void begin() {
     if (may_refine()) stated_ = stated_grids(scene_, plan_);
     out_.false_lattices = stated_.false_lattices;

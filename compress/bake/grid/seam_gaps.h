@@ -15,8 +15,8 @@ struct SeamSummary {
   double largest_gap = 0.0; ///< upper bound of the seam widths at LOD level 0; world units
 };
 
-/// Finds instances on grids of their own whose bounds touch other geometry. There, one point of the source may decode
-/// to two points, so the seam may open by the position errors of both sides. World-space geometries share nested grids
+/// Finds instances on their own grids whose bounds touch other geometry. One point of the source may decode to two
+/// points there, so the seam may open by the position errors of both sides. World-space geometries share nested grids
 /// and have no such seams between them.
 class InstanceSeams {
 public:
@@ -24,7 +24,7 @@ public:
   explicit InstanceSeams(const BakedFile& file);
 
   size_t instance_count() const { return boxes_.size(); }
-  /// Instances on grids of their own that touch other instances, ascending.
+  /// Instances on their own grids that touch other instances, ascending.
   std::span<const uint32_t> touching() const { return touching_; }
 
   /// Per entry of touching(): upper bound of the width of its widest seam at LOD level 0, in world units. It is the sum

@@ -191,7 +191,7 @@ private:
         results[i] = {};
   }
 
-  /// Whether more corners of the group are locked because other groups share them than for ever.
+  /// Whether more corners of the group are locked temporarily, because other groups share them, than permanently.
   bool may_unlock(const std::vector<uint32_t>& members) const {
     uint64_t shared = 0, for_ever = 0;
     for (const uint32_t number : members) {

@@ -32,7 +32,7 @@ struct LodGroup {
   uint32_t level = 0;    ///< of its clusters
   bool terminal = false; ///< nothing coarser was made from it: its clusters are part of all coarser levels
   /// Error of the surface simplified from this group, in lattice steps: its maximum distance, both ways, from the part
-  /// of level 0 that it stands for. At least as large as the errors of all groups below; infinite if terminal.
+  /// of level 0 that it represents. At least as large as the errors of all groups below; infinite if terminal.
   double error = 0.0;
   LodSphere sphere; ///< contains the simplified surface and the spheres of all groups below
 };

@@ -58,12 +58,12 @@ private:
       dropped_ |= stand.dropped;
       if (stand.dropped) bound = std::max(bound, mesh_.triangles[stand.triangle].error);
     }
-    // Dropping pieces does not change the distance of the remaining triangles from what they stand for.
+    // Dropping pieces does not change the distance of the remaining triangles from the surface that they represent.
     for (size_t i = 0; i < stands.size(); ++i)
       if (!stands[i].dropped) mesh_.triangles[stands[i].triangle].error = errors[i];
   }
 
-  /// Lists, for each remaining triangle, the group's triangles that it may stand for.
+  /// Lists, for each remaining triangle, the group's triangles that it may represent.
   void list_below() {
     const auto [ends, found] = links_.by_simplified(mesh_.triangles.size());
     // per source triangle: the last triangle whose list it was added to

@@ -40,7 +40,7 @@ struct SimplifiedGroup {
   std::vector<QuantizedVertex> new_vertices; ///< numbered from kNewNumber
   std::vector<Triangle> triangles;           ///< vertex numbers, cluster by cluster
   std::vector<double> errors;                ///< per triangle, lattice steps
-  /// per triangle: end of its range in `below`, the group's triangles that it may stand for
+  /// per triangle: end of its range in `below`, the group's triangles that it may represent
   std::vector<uint32_t> below_ends, below;
   std::vector<uint32_t> cluster_ends;
   std::vector<uint32_t> cluster_kinds;

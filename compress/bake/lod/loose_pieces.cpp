@@ -22,7 +22,7 @@ struct Piece {
   bool locked = false, dropped = false;
 };
 
-/// The triangle nearest to a piece, which stands for it once the piece is dropped.
+/// The triangle nearest to a piece, which represents it once the piece is dropped.
 struct PieceSubstitute {
   double distance = std::numeric_limits<double>::infinity();
   uint32_t piece = kNoPiece, triangle = kNoPiece;
@@ -163,7 +163,7 @@ private:
 
   SimplifyMesh& m_;
   std::vector<Piece> pieces_;
-  std::vector<uint32_t> stand_of_; ///< per dropped piece: the triangle that stands for it
+  std::vector<uint32_t> stand_of_; ///< per dropped piece: the triangle that represents it
 };
 
 } // namespace

@@ -16,16 +16,16 @@ struct DropTargets {
   uint32_t at_any_cost = 0;
 };
 
-/// What stands for a triangle after the drop: the triangle itself or, if it was dropped, one near it. Triangle numbers
-/// are those of the new mesh.
+/// The representative of a triangle after the drop: the triangle itself or, if it was dropped, one near it. Triangle
+/// numbers are those of the new mesh.
 struct TriangleSubstitute {
   uint32_t triangle = 0;
   bool dropped = false;
 };
 
 /// Drops connected pieces without locked points, in order of their distance from other pieces; at least one piece
-/// remains. The error of the triangle that stands for a piece grows to include the distance. Returns what stands for
-/// each triangle of the old mesh. Takes quadratic time in the number of pieces.
+/// remains. The error of the triangle that represents a piece grows to include the distance. Returns the representative
+/// of each triangle of the old mesh. Takes quadratic time in the number of pieces.
 std::vector<TriangleSubstitute> drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets);
 
 } // namespace packtrace

@@ -106,7 +106,7 @@ private:
     return users.count++;
   }
 
-  /// A mesh that moves is equal to no other; of those equal to it, the first that stays stands for the others.
+  /// A moving mesh is not merged with equal meshes. Of those, the first that does not move replaces the others.
   void separate_deforming_meshes() {
     std::map<uint32_t, uint32_t> first_still;
     for (uint32_t i = 0; i < equal_mesh_.size(); ++i)
@@ -175,7 +175,7 @@ private:
     std::optional<uint32_t> geometry;
 
     bool shared() const { return shapes + objects > 1; }
-    /// Whether its shapes become instances on a grid of their own.
+    /// Whether its shapes become instances with their own grid.
     bool instanced(size_t triangles) const {
       return shared() && !(one_transform && objects == 0) && (one_mesh || triangles >= kMinSharedTriangles);
     }
@@ -241,7 +241,7 @@ private:
     }
   }
 
-  /// Gives a shape that moves a geometry on a grid of its own, like an object's.
+  /// Gives a moving shape a geometry with its own grid, like that of an object.
   void place_moving_shape(Shape shape) {
     const Affine placement(shape.parent_from_mesh);
     shape.parent_from_mesh = DAffine(1.0);

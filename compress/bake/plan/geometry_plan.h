@@ -35,7 +35,7 @@ struct GeometryPlan {
   /// First entries of this geometry's runs in ScenePlan::material_slots: one run for each distinct assignment of
   /// materials among its instances. The materials of one slot have the same class but may differ otherwise.
   std::vector<uint32_t> material_runs;
-  bool world_space = false; ///< on the scene's grid; otherwise on a grid of its own
+  bool world_space = false; ///< on the scene's grid; otherwise on its own grid
   /// Largest factor by which an instance scales an error per object axis to an error per world axis.
   double max_stretch = 1.0;
   bool deforms = false; ///< some part's mesh moves; never in world space
@@ -59,7 +59,7 @@ struct ScenePlan {
 };
 
 /// Smallest mesh for which world shapes with equal meshes of different indices share a geometry. Smaller ones stay on
-/// the world's grid: they are tiles of one surface more often than copies of one thing, and a grid of their own would
+/// the world's grid: they are more often tiles of one surface than copies of one object, and a separate grid would
 /// open seams.
 inline constexpr size_t kMinSharedTriangles = 128;
 

@@ -16,12 +16,12 @@ namespace packtrace {
 
 /// Builds the proxies of a file's instanced geometries, or of all geometries if none is instanced. Geometries in which
 /// nothing occludes, and those that deform, get none.
-/// @param warn is called with what was asked for and could not be done
+/// @param warn is called for each option that could not be applied
 /// Throws like voxelize() and encode_occupancy(), and Error(kLimitExceeded) for more than 256 materials of a geometry.
 std::vector<Proxy> build_proxies(const BakedFile& file, const ProxyConfig& config, const MemoryBudget& budget,
                                  Progress& progress, const std::function<void(std::string)>& warn);
 
-/// Builds the proxy of one geometry; nothing if it has no occluding triangle. Throws like build_proxies().
+/// Builds the proxy of one geometry; nullopt if it has no occluding triangle. Throws like build_proxies().
 std::optional<Proxy> build_proxy(const BakedFile& file, uint32_t geometry, const ProxyConfig& config,
                                  const MemoryBudget& budget);
 

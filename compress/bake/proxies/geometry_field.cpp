@@ -44,7 +44,7 @@ public:
       for_samples_near(t, 0.5, [&](size_t i, DVec3 p) { offer(i, p, t); });
   }
 
-  /// Each sample looks at what its 26 neighbours at a distance of `step` know.
+  /// Each sample considers the triangles of its 26 neighbours at a distance of `step`.
   void flood(int64_t step) {
     const std::vector<uint32_t> known = nearest_;
     const auto [nx, ny, nz] = size_;

@@ -158,8 +158,8 @@ private:
     result_.filled = true;
   }
 
-  /// Selects voxels until they block as many lines as the triangles do. Voxels whose centres are deepest inside a
-  /// closed surface, or nearest to an open one, come first.
+  /// Selects voxels until they block the same number of lines as the triangles. Voxels whose centres are deepest inside
+  /// a closed surface, or nearest to an open one, come first.
   void match() {
     const VoxelSet surface = result_.set;
     result_.set = source_.closed ? inside_voxels(source_, config_.voxels) : VoxelSet(grid_.size);

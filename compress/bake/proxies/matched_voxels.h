@@ -19,9 +19,9 @@ struct LineScene {
   std::function<float(VoxelIndex)> depth;
 };
 
-/// Returns the depth up to which voxels must be selected to block as many lines as the triangles do. The lines are
-/// parallel and evenly spaced in each of several directions. By Cauchy's formula, the number of blocked lines measures
-/// the mean projected area. Deterministic.
+/// Returns the depth up to which voxels must be selected to block the same number of lines as the triangles. The lines
+/// are parallel and evenly spaced in each of several directions. By Cauchy's formula, the number of blocked lines
+/// measures the mean projected area. Deterministic.
 float matching_depth(const LineScene& scene);
 
 } // namespace packtrace

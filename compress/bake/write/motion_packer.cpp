@@ -115,7 +115,7 @@ private:
     movers_.push_back(mover);
   }
 
-  /// Cameras have no geometry, so their error is to be small compared with a float of their coordinates.
+  /// Cameras have no geometry, so their error must be small compared with the float spacing at their coordinates.
   void add_camera(const CameraMotion& camera) {
     constexpr double kFloatStep = 0x1p-24;
     Bounds box;
@@ -156,7 +156,7 @@ private:
 
   /// Finds the largest steps of a track that keep the wanted errors of all its users.
   void pack(uint32_t track) {
-    constexpr double kDefaultWanted = 0x1p-20; // if no one sees the motion
+    constexpr double kDefaultWanted = 0x1p-20; // if no geometry limits the error
     constexpr int kMaxRefinements = 48;
     double wanted = std::numeric_limits<double>::infinity(), lever = 0.0;
     for (const uint32_t user : users_[track]) {

@@ -31,7 +31,7 @@ struct DracoPrimitive {
 };
 
 /// Encodes one primitive with Draco's edgebreaker method. Draco drops triangles with coinciding corners, so `faces` may
-/// be less than the number of triangles. Returns nothing if Draco cannot encode the mesh.
+/// be less than the number of triangles. Returns nullopt if Draco cannot encode the mesh.
 /// @param primitive with at least one triangle, inside the grid
 std::optional<DracoPrimitive> encode_draco(const PlainPrimitive& primitive, const DracoGrid& grid,
                                            const DracoConfig& config);

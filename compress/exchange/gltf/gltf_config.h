@@ -14,7 +14,7 @@ enum class GltfCodec : uint8_t {
   kMeshopt ///< EXT_meshopt_compression of integers (KHR_mesh_quantization)
 };
 
-/// What a file is for.
+/// Purpose of a file.
 enum class GltfProfile : uint8_t {
   kPortable, ///< no extension at all
   kWeb,      ///< the smallest file that decodes fast in a browser

@@ -37,7 +37,7 @@ struct GltfPrimitive {
   std::optional<MeshoptPrimitive> meshopt; ///< if set, `plain` keeps only its material slot
 };
 
-/// The primitives of a geometry, and what they need to be stored.
+/// The primitives of a geometry, and how they are stored.
 struct GltfGeometry {
   std::vector<GltfPrimitive> primitives;
   GltfLatticeBox box;

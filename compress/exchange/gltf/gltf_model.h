@@ -33,7 +33,7 @@ struct MeshoptCoding {
   uint64_t count = 0;
 };
 
-/// A glTF 2.0 document in the making: its JSON and one binary buffer.
+/// Builds a glTF 2.0 document: its JSON and one binary buffer.
 class GltfModel {
 public:
   GltfModel();

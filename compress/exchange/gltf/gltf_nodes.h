@@ -15,7 +15,7 @@ public:
   GltfNodes(const BakedFile& file, const GltfConfig& config, GltfMeshes& meshes, GltfModel& model, GltfReport& report)
       : file_(file), config_(config), meshes_(meshes), model_(model), report_(report) {}
 
-  /// @param is_merged by instance: whether GltfMeshes::add_world() has it
+  /// @param is_merged by instance: whether GltfMeshes::add_world() has added it
   void add_all(const std::vector<bool>& is_merged);
 
 private:

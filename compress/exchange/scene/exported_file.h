@@ -17,7 +17,7 @@ struct ExportedFile {
   std::vector<std::byte> bytes;
 };
 
-/// Takes the bytes of a file that is written while it is made, in order.
+/// Receives the bytes of a file in order, as they are generated.
 using ByteSink = std::function<void(std::span<const std::byte>)>;
 
 /// Statistics of an export to a scene.

@@ -42,7 +42,7 @@ public:
   float level(size_t texel) const { return wanted_[texel] + error_[texel]; }
 
 private:
-  static constexpr float kMinGain = 1e-3f; // of a gain, so that rounding cannot let the search go on for ever
+  static constexpr float kMinGain = 1e-3f; // of a gain, so that the search ends despite rounding
 
   size_t at(int32_t x, int32_t y) const {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);

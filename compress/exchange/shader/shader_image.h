@@ -40,7 +40,7 @@ uint64_t shader_image_elements(TexelFormat format, uint32_t width, uint32_t heig
 /// Longest side of the largest image of the same shape, at most `width` x `height`, that fits; 0 if none does.
 uint32_t largest_image_side(TexelFormat format, uint32_t width, uint32_t height, uint64_t max_elements);
 
-/// Encodes an image of at least one texel with the least error that is found. The same texels give the same words.
+/// Encodes an image of at least one texel, minimising the error. The same texels give the same words.
 ShaderImage encode_shader_image(const AlbedoTexture& source, TexelFormat format);
 
 /// Bytes of working memory of encode_shader_image(), at most.

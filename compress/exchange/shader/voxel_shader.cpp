@@ -8,7 +8,7 @@
 namespace packtrace {
 namespace {
 
-/// Reads the stream: voxels::OccupancyHeader says what the words mean.
+/// Reads the stream, whose words voxels::OccupancyHeader describes.
 constexpr const char* kDecoder = R"(
 uint count_bits(uint v) {
   v = v - (v >> 1 & 0x55555555u);

@@ -11,7 +11,7 @@ namespace packtrace {
 
 inline constexpr uint32_t kShaderAoRays = 16;
 
-/// What an exported shader shows, in voxel units. A pixel's ray is
+/// Camera and lighting of an exported shader, in voxel units. A pixel's ray is
 /// eye + t (forward + u right + v up), with (u, v) = (pixel - resolution / 2) / resolution.y.
 struct ShaderView {
   Vec3 eye, right, up, forward;

@@ -39,7 +39,7 @@ std::vector<std::byte> assemble(const Sections& sections);
 /// Checks hashes, sizes, and every range and index, so that all references of records are valid. Of materials, masks
 /// and strings only the references are checked.
 /// @param bytes 8-byte aligned
-/// @param name stands for the file in error messages
+/// @param name of the file in error messages
 /// Throws Error(kInput) with the fault, Error(kUnsupported) for other versions.
 Sections validate(std::span<const std::byte> bytes, const std::string& name);
 

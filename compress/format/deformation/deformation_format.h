@@ -41,7 +41,7 @@ struct DeformationRecord {
 
 inline constexpr uint32_t kMaxChainLevels = 8;
 
-/// Geometries that stand for each other at different distances, fine to coarse. All instances of each of them take
+/// Geometries that replace each other by distance, fine to coarse. All instances of each of them take
 /// part. A geometry belongs to one chain at most.
 struct LevelChainRecord {
   uint32_t level_count; ///< 2..kMaxChainLevels

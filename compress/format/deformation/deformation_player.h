@@ -10,8 +10,8 @@
 
 namespace packtrace {
 
-/// Decodes the frames of one deforming geometry. Keeps the two frames around the current time, 24 bytes per vertex. The
-/// next frame takes one step; any other frame as many as there are frames between it and the begin of its group.
+/// Decodes the frames of one deforming geometry. Keeps the two frames around the current time, 24 bytes per vertex.
+/// Moving to the next frame decodes one frame; any other frame is decoded from the begin of its group.
 class DeformationPlayer final : public FrameVertices {
 public:
   /// Starts at frame 0.

@@ -7,7 +7,7 @@
 #include "compress/format/deformation/frame_vertices.h"
 #include "compress/format/layout/bit_stream.h"
 
-/// One frame of one cluster as bit fields: the residuals of a prediction. Each frame chooses a prediction of its own:
+/// One frame of one cluster as bit fields: the residuals of a prediction. Each frame chooses its prediction:
 ///
 ///   symbol  bits  meaning
 ///   kind    2     0 the file's vertices, 1 the frame before, 2 linear: twice the frame before less the one before that

@@ -36,7 +36,7 @@ public:
   /// Writes the vertices of one cluster in the order of its record. May be called from several threads, and several
   /// times for a cluster.
   /// @param cluster number within the geometry
-  /// @param out as many elements as the cluster has vertices
+  /// @param out one element per vertex of the cluster
   virtual void read(uint32_t cluster, std::span<FramePoint> out) const = 0;
 };
 

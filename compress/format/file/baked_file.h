@@ -57,7 +57,7 @@ public:
   static BakedFile open(const std::filesystem::path& path);
 
   /// Like open(), for bytes in memory. Resident bytes are copied.
-  /// @param name stands for the path in error messages
+  /// @param name of the file in error messages
   static BakedFile from_bytes(std::span<const std::byte> bytes, const std::string& name = "memory");
 
   /// Like from_bytes() without the copy: the caller keeps the bytes alive and unchanged. They must be 8-byte aligned.

@@ -84,7 +84,7 @@ struct SequenceUse {
   }
 };
 
-/// Geometries that stand for each other at different distances.
+/// Geometries that replace each other by distance.
 struct LevelChainUse {
   std::vector<std::string> names; ///< of the geometries, fine to coarse
   std::vector<double> distances;  ///< world units, one less

@@ -20,7 +20,7 @@ struct LodLevelRecord {
   uint64_t triangles;   ///< triangles of the discrete level
   uint32_t base;        ///< level-0 geometry, which instances reference
   uint32_t level;       ///< 0, 1, ... below kMaxLodLevels
-  /// Geometry that holds its clusters: the base at level 0, else one of its own with the base's lattice and slots.
+  /// Geometry that holds its clusters: the base at level 0, else a separate one with the base's lattice and slots.
   uint32_t geometry;
   uint32_t group_count; ///< number of groups of its clusters
   /// Error of the discrete level against level 0, object units: largest finite group error of the finer levels, or 0.

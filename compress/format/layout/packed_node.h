@@ -49,7 +49,7 @@ struct PackedNode {
 static_assert(sizeof(PackedNode) == 80 && std::is_trivially_copyable_v<PackedNode>);
 
 // TreeRecord::geometry
-inline constexpr uint32_t kWorldTree = ~0u; ///< tree over all world-space geometries without a tree of their own
+inline constexpr uint32_t kWorldTree = ~0u; ///< tree over all world-space geometries without their own tree
 
 /// Tree coordinates of vertices are within +-this, so that 255 << 23 covers any extent.
 inline constexpr int32_t kMaxTreeCoordinate = (1 << 30) - (1 << 23);

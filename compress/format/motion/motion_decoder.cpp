@@ -35,7 +35,7 @@ public:
     return d;
   }
 
-  /// Seven bits per byte, low ones first; the highest bit says that another byte follows.
+  /// Seven bits per byte, low ones first; the highest bit is set if another byte follows.
   uint32_t count() {
     uint64_t result = 0;
     for (uint32_t shift = 0; shift < 35; shift += 7) {

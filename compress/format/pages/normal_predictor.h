@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// What the decoder knows about a vertex before its normal. All normals have unit length.
+/// Data about a vertex that are decoded before its normal. All normals have unit length.
 struct NormalSurroundings {
   DVec3 face_sum{0.0};               ///< sum of the cross products of the vertex's triangles, in lattice steps
   uint32_t triangle_count = 0;       ///< triangles in face_sum
@@ -95,7 +95,7 @@ private:
     return unit(guess);
   }
 
-  /// Vertices are similar if they know as much of their surroundings and their guesses agree as well.
+  /// Vertices are similar if they have the same kinds of neighbours and their guesses agree equally well.
   uint32_t similar_vertices(const NormalSurroundings& s) const {
     const DVec3 difference = guesses_[0] - guesses_[1];
     const auto apart = static_cast<uint32_t>(glm::dot(difference, difference) * 4096.0); // at most 4 * 4096

@@ -30,7 +30,7 @@ inline constexpr size_t kPaletteBytes = 3 * 256, kR2G4B2KeyBytes = 2 * 3, kBc1Bl
 /// Size of a texture's data in bytes. Sides are at most kMaxTextureSide.
 uint64_t texture_bytes(TextureCodec codec, uint32_t width, uint32_t height);
 
-/// Returns the fault of a texture record, or nothing. Any data are valid for every codec.
+/// Returns the fault of a texture record, or nullopt. Any data are valid for every codec.
 /// @param bytes size of the section of texture bytes
 std::optional<std::string_view> find_texture_fault(const baked::TextureRecord& record, uint64_t bytes);
 

@@ -33,7 +33,7 @@ struct CornerBits {
 };
 
 /// Corners of a leaf: the corners [begin, end) that its triangles add, and the two corners that its first triangle
-/// keeps. If the first triangle begins a strip, `kept` repeats one of its own corners.
+/// keeps. If the first triangle begins a strip, `kept` repeats one of its corners.
 struct LeafCorners {
   uint16_t begin, end;
   uint16_t kept[2];

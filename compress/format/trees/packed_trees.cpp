@@ -114,7 +114,7 @@ public:
     return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && placed_[geometry] != baked::kNone;
   }
 
-  /// Divides the geometries with clusters into those of the world's tree and those with trees of their own.
+  /// Divides the geometries with clusters into those of the world's tree and those with their own trees.
   void find_world(std::vector<uint32_t>& world, std::vector<uint32_t>& others) const {
     const auto& geometries = sections_.geometries;
     uint32_t mantissa = 0;

@@ -17,7 +17,7 @@ struct PackedTrees {
 };
 
 /// Builds the trees of a file: one over the clusters of all world-space geometries, and one for each other geometry
-/// with clusters. A world-space geometry gets a tree of its own if the world's tree cannot hold it: it has several
+/// with clusters. A world-space geometry gets its own tree if the world's tree cannot hold it: it has several
 /// instances, its instance is not placed by the identity, or its step is not 2^-k times the coarsest one with k in
 /// 0..30. Clusters that neither camera nor occlusion rays see are left out; a tree may be empty. Runs on all threads;
 /// the result depends only on the arguments.

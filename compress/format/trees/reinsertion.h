@@ -14,7 +14,7 @@ struct ReinsertionConfig {
 };
 
 /// Optimises a tree by reinsertion: removes subtrees, largest first, and inserts each where the sum of the areas of
-/// inner nodes becomes least. Boxes of very different size thereby move to levels of their own, which top-down splits
+/// inner nodes becomes least. Boxes of very different size thereby move to separate levels, which top-down splits
 /// do not achieve. Nested boxes become a chain as deep as the number of boxes. Runs on the calling thread. Takes O(n)
 /// time, plus for each move the levels above whose boxes change.
 /// Source: Bittner, Hapala, Havran, "Fast insertion-based optimization of bounding volume hierarchies" (2013); the

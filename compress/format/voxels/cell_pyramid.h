@@ -7,7 +7,7 @@
 namespace packtrace {
 
 /// Cells of 2^k voxels along an axis, for k = 0, 1, ...: which hold a set voxel, and which are full. Voxels outside the
-/// grid count as whatever is asked for.
+/// grid match every query.
 class CellPyramid {
 public:
   /// @param set must outlive the pyramid

@@ -25,9 +25,8 @@ public:
   /// Largest error of a stored distance within the band, in voxels.
   double quantum() const { return 0.5 * double{voxels::kFieldBand} / half_; }
 
-  /// Distance at a point between the samples, interpolated within the band; elsewhere, a distance that nothing is
-  /// nearer than, with the sign of the side. In voxels, as the point is. Points outside the samples count as if at
-  /// their border.
+  /// Distance at a point between the samples, interpolated within the band; elsewhere a lower bound of the distance,
+  /// with the sign of the side. In voxels, as the point is. Points outside the samples count as if at their border.
   float distance(glm::vec3 p) const;
   /// A sample of the band; nothing if its brick is not stored.
   std::optional<float> sample(VoxelIndex v) const;
@@ -49,7 +48,7 @@ private:
 /// @param bits 8 or 16
 DistanceField encode_field(VoxelIndex size, std::span<const float> distances, uint32_t bits);
 
-/// Why header or words are damaged; nothing if DistanceField may read them.
+/// Returns why header or words are damaged; nullopt if DistanceField may read them.
 std::optional<std::string_view> find_field_fault(const voxels::FieldHeader& header, std::span<const uint32_t> words);
 
 } // namespace packtrace

@@ -134,7 +134,7 @@ private:
     for (uint32_t l = 1; l < levels_; ++l) cells = build_level(pyramid, l, cells, is_node);
   }
 
-  /// Fills level l, whose nodes stand for `cells`, and returns the cells of the nodes below.
+  /// Fills level l, whose nodes represent `cells`, and returns the cells of the nodes below.
   template <class IsNode>
   std::vector<VoxelIndex> build_level(const CellPyramid& pyramid, uint32_t l, const std::vector<VoxelIndex>& cells,
                                       const IsNode& is_node) {

@@ -13,7 +13,7 @@ inline constexpr uint32_t kRankGroupBlocks = 64; ///< rank blocks per group, who
 inline constexpr uint32_t kMaxSwatches = 256;
 
 // OccupancyHeader::flags
-inline constexpr uint32_t kHasFull = 1u << 0; ///< cells without a node have a bit that says whether they are full
+inline constexpr uint32_t kHasFull = 1u << 0; ///< cells without a node have a bit that is set if they are full
 inline constexpr uint32_t kOccupancyFlags = kHasFull;
 
 /// One level of a stream. Level 0 is the grid of top cells, x fastest; each level below has a node of 8 bits, one per

@@ -55,7 +55,7 @@ public:
   /// Palette index of a set voxel of the last level; 0 without swatches or for voxels of full cells.
   uint32_t swatch(VoxelIndex voxel) const;
 
-  /// What a mask bit says.
+  /// Meaning of a mask bit.
   enum class Cell : uint32_t { kEmpty, kFull, kNode };
   /// @param level 0..levels() - 2
   Cell cell(uint32_t level, uint64_t bit) const {
@@ -106,7 +106,7 @@ private:
     return word == end ? sum : sum + static_cast<uint64_t>(std::popcount(*word));
   }
   bool read_bit(uint64_t word, uint64_t bit) const { return (words_[word + bit / 32] >> (bit % 32) & 1) != 0; }
-  /// Bit of the last level that holds a voxel; none if a level above decides, then `full` says how.
+  /// Bit of the last level that holds a voxel; none if a level above decides; `full` is then its result.
   std::optional<uint64_t> leaf_bit(VoxelIndex voxel, bool& full) const;
 
   voxels::OccupancyHeader header_{};
@@ -137,7 +137,7 @@ uint64_t count_occupied(const OccupancyStream& stream);
 /// All voxels of a stream.
 VoxelSet decode_occupancy(const OccupancyStream& stream);
 
-/// Why header or words are damaged; nothing if OccupancyStream may read them. Allocates nothing.
+/// Returns why header or words are damaged; nullopt if OccupancyStream may read them. Allocates nothing.
 std::optional<std::string_view> find_occupancy_fault(const voxels::OccupancyHeader& header,
                                                      std::span<const uint32_t> words);
 

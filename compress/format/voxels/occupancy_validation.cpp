@@ -8,7 +8,7 @@ namespace {
 
 using namespace voxels;
 
-/// Reads the parts of a stream in order and compares each with what the header says of it.
+/// Reads the parts of a stream in order and compares each with the header.
 class OccupancyCheck {
 public:
   OccupancyCheck(const OccupancyHeader& header, std::span<const uint32_t> words) : header_(header), words_(words) {}

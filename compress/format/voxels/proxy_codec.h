@@ -12,7 +12,7 @@
 
 namespace packtrace {
 
-/// A stand-in for a geometry.
+/// A simplified representation of a geometry.
 struct Proxy {
   voxels::ProxyRecord record{};
   OccupancyStream voxels;        ///< kVoxelProxy
@@ -35,7 +35,7 @@ std::vector<uint8_t> encode_proxies(std::span<const Proxy> proxies);
 /// Decodes a stream that find_proxy_fault() has accepted.
 std::vector<Proxy> read_proxies(std::span<const uint8_t> stream);
 
-/// Why a stream is damaged; nothing if it is not. Allocates no more than the stream holds.
+/// Returns why a stream is damaged; nullopt if it is valid. Allocates no more than the stream holds.
 /// @param geometry_count proxies belong to geometries below it
 std::optional<std::string_view> find_proxy_fault(std::span<const uint8_t> stream, uint64_t geometry_count);
 

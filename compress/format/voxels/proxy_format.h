@@ -20,7 +20,8 @@ inline constexpr uint32_t kClosedSource = 1u << 0; ///< every edge of the geomet
 inline constexpr uint32_t kFilled = 1u << 1;       ///< voxels inside are set, too
 inline constexpr uint32_t kThin = 1u << 2;         ///< 6-separating; otherwise every voxel that the surface touches
 inline constexpr uint32_t kSigned = 1u << 3;       ///< distances inside are negative
-inline constexpr uint32_t kMatched = 1u << 4;      ///< as many voxels as hide what the triangles hide; not with kThin
+inline constexpr uint32_t kMatched =
+    1u << 4; ///< voxels that block the same number of lines as the triangles; not with kThin
 inline constexpr uint32_t kProxyFlags = kClosedSource | kFilled | kThin | kSigned | kMatched;
 
 struct ProxyHeader {

@@ -16,7 +16,7 @@ using VoxelIndex = std::array<uint32_t, 3>;
 /// Most voxels along an axis.
 inline constexpr uint32_t kMaxGridSize = 4096;
 
-/// Where the voxels of a grid lie: voxel (i, j, k) is the closed cube from origin + edge (i, j, k) to
+/// Position and size of a grid: voxel (i, j, k) is the closed cube from origin + edge (i, j, k) to
 /// origin + edge (i + 1, j + 1, k + 1).
 struct VoxelFrame {
   DVec3 origin{0.0}; ///< object space
@@ -45,7 +45,7 @@ public:
   bool test(VoxelIndex v) const { return (row(v[1], v[2])[v[0] / 64] >> (v[0] % 64) & 1) != 0; }
   void set(VoxelIndex v) { row(v[1], v[2])[v[0] / 64] |= uint64_t{1} << (v[0] % 64); }
   void clear(VoxelIndex v) { row(v[1], v[2])[v[0] / 64] &= ~(uint64_t{1} << (v[0] % 64)); }
-  /// False outside the grid, too. Takes signed indices, so that neighbours of border voxels may be asked for.
+  /// False outside the grid, too. Takes signed indices, so that neighbours of border voxels can be queried.
   bool contains(int64_t x, int64_t y, int64_t z) const {
     if (x < 0 || y < 0 || z < 0 || x >= size_[0] || y >= size_[1] || z >= size_[2]) return false;
     return test({static_cast<uint32_t>(x), static_cast<uint32_t>(y), static_cast<uint32_t>(z)});

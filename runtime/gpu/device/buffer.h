@@ -18,9 +18,9 @@ enum class BufferPlace : uint8_t {
 class Buffer {
 public:
   Buffer() = default;
-  /// @param what stands for the buffer in messages
-  /// Throws Error(kLimitExceeded) with the bytes needed and there, and Error(kUnsupported) for more bytes than a
-  /// kernel can address in one buffer.
+  /// @param what name of the buffer in messages
+  /// Throws Error(kLimitExceeded) with the needed and the available bytes, and Error(kUnsupported) for more bytes than
+  /// a kernel can address in one buffer.
   Buffer(std::shared_ptr<Device> device, uint64_t bytes, BufferPlace place, const char* what);
   ~Buffer();
   Buffer(Buffer&& other) noexcept { swap(other); }
@@ -51,7 +51,7 @@ private:
   std::byte* mapped_ = nullptr;
 };
 
-/// A buffer on the device with the given bytes, and `extra_bytes` zeros behind them.
+/// Creates a buffer on the device that holds the given bytes, followed by `extra_bytes` zeros.
 Buffer upload(const std::shared_ptr<Device>& device, std::span<const std::byte> bytes, const char* what,
               uint64_t extra_bytes = 0);
 /// Overwrites bytes of a buffer on the device.

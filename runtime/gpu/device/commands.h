@@ -13,8 +13,8 @@ namespace packtrace::gpu {
 class Buffer;
 class Kernel;
 
-/// Work that is submitted at once. A dispatch sees what all work before it wrote, and a copy what dispatches before it
-/// wrote; copies that follow each other must not overlap.
+/// Work that is submitted at once. Dispatches see the writes of all earlier work, copies those of earlier dispatches.
+/// Consecutive copies must not overlap.
 class Commands {
 public:
   /// Kernels and buffers must outlive the run.

@@ -19,7 +19,8 @@ class Buffer;
 class Commands;
 class Kernel;
 
-/// The device stopped working; nothing that was on it can be read any more. Not an Error: the program's state is lost.
+/// Thrown if the device stopped working: its memory cannot be read any more. Not an Error, because state of the program
+/// is lost.
 class DeviceLost : public std::runtime_error {
 public:
   using std::runtime_error::runtime_error;
@@ -29,7 +30,7 @@ public:
 /// rest. The message names the call.
 void check(VkResult result, const char* call);
 
-/// What kernels must know of a device.
+/// Properties of a device that kernels depend on.
 struct DeviceTraits {
   bool fused_floats = false;  ///< fma() of floats rounds once, refined division is right, nothing is contracted
   bool fused_doubles = false; ///< fma() of doubles rounds once
@@ -51,7 +52,7 @@ class Device {
 public:
   /// Throws Error(kUnsupported) if there is no loader, or no device with the features that kernels need.
   static std::shared_ptr<Device> open(const GpuConfig& config);
-  /// The device that another call with an equal configuration opened and that is still in use and works, else open().
+  /// Returns the device of an earlier call with an equal configuration if it is still in use and works, else open().
   static std::shared_ptr<Device> share(const GpuConfig& config);
   ~Device();
   Device(const Device&) = delete;
@@ -71,8 +72,8 @@ public:
   /// @param push push constants
   /// Throws DeviceLost.
   double run(const Kernel& kernel, std::span<const std::byte> push, uint32_t groups);
-  /// Runs commands and waits. Returns the time of each dispatch in ms; nothing on devices without timestamps and on CPU
-  /// devices. Throws DeviceLost.
+  /// Runs commands and waits. Returns the time of each dispatch in ms, or an empty list on CPU devices and devices
+  /// without timestamps. Throws DeviceLost.
   std::vector<double> run(const Commands& commands);
   /// Records commands by a function, runs them and waits. Returns their time in ms. Throws DeviceLost.
   double run(const std::function<void(VkCommandBuffer)>& record);
@@ -88,7 +89,7 @@ public:
 
   /// Messages of the validation layer so far. Empty without GpuConfig::validation.
   std::vector<std::string> validation_messages() const;
-  /// Whether the validation layer was asked for and found.
+  /// Whether the validation layer was requested and found.
   bool validates() const { return messenger_ != VK_NULL_HANDLE; }
 
 private:
@@ -106,7 +107,7 @@ private:
   const GpuConfig config_;
   VkInstance instance_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
-  /// volk's pointers are those of the instance that was loaded last, which may not have the extension.
+  /// volk's function pointers belong to the instance that was loaded last, which may lack the extension.
   PFN_vkDestroyDebugUtilsMessengerEXT destroy_messenger_ = nullptr;
   VkPhysicalDevice physical_ = VK_NULL_HANDLE;
   VkPhysicalDeviceProperties properties_{};

@@ -114,7 +114,7 @@ DeviceFeatures features_of(VkPhysicalDevice device) {
   const VkPhysicalDeviceProperties properties = properties_of(device);
   DeviceFeatures out;
   out.api_version = properties.apiVersion;
-  if (properties.apiVersion < VK_API_VERSION_1_1) return out; // has no functions to ask for subgroups
+  if (properties.apiVersion < VK_API_VERSION_1_1) return out; // has no functions that query subgroups
   VkPhysicalDeviceFeatures features;
   vkGetPhysicalDeviceFeatures(device, &features);
   std::vector<VkQueueFamilyProperties> families;

@@ -7,7 +7,7 @@
 
 namespace packtrace::gpu {
 
-/// What a device offers of what kernels need.
+/// Features of a device that kernels need.
 struct DeviceFeatures {
   uint32_t api_version = 0;
   bool int64 = false, float64 = false;
@@ -17,7 +17,7 @@ struct DeviceFeatures {
   bool structures = false;      ///< has acceleration structures and ray tracing pipelines
 };
 
-/// Names what is missing for rays through `structures`; empty if nothing.
+/// Returns the names of the features that tracing through `structures` needs and the device lacks; empty if it has all.
 std::string missing_features(const DeviceFeatures& device, GpuStructures structures);
 
 } // namespace packtrace::gpu

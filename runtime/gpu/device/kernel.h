@@ -44,15 +44,15 @@ public:
 
   /// Binds a buffer, which must outlive the runs of this kernel.
   void bind(uint32_t binding, const Buffer& buffer);
-  /// What the driver's compiler says of the shaders, such as numbers of registers: shader and value, value. Empty
-  /// without DeviceTraits::statistics.
+  /// Statistics of the driver's compiler about the shaders, such as numbers of registers: shader and value, value.
+  /// Empty without DeviceTraits::statistics.
   std::vector<std::pair<std::string, double>> statistics() const;
   /// Whether it is a ray tracing pipeline.
   bool traces_structures() const { return traces_; }
   /// Binds the acceleration structure of a ray tracing pipeline.
   void bind(VkAccelerationStructureKHR structure);
 
-  /// Records the start of all groups, for commands of the caller.
+  /// Records the dispatch of all groups into the caller's command buffer.
   void record(VkCommandBuffer commands, std::span<const std::byte> push, uint32_t groups_x, uint32_t groups_y) const;
 
 private:

@@ -26,7 +26,7 @@ void StagedBuffer::write(Commands& commands, std::span<const std::byte> bytes) {
 }
 
 uint64_t StagedBuffer::write_changes(Commands& commands, std::span<const std::byte> bytes, size_t record_bytes) {
-  constexpr size_t kJoined = 256; // a copy of its own costs more than so many bytes
+  constexpr size_t kJoined = 256; // a separate copy costs more than this many bytes
   uint64_t copied = 0;
   size_t begin = 0, end = 0; // bytes to copy
   const auto copy_run = [&] {

@@ -10,10 +10,10 @@
 
 namespace packtrace::gpu {
 
-/// Copies bytes on several threads: one does not reach the speed of the memory.
+/// Copies bytes on several threads, because one thread does not reach the memory bandwidth.
 void copy_in_parts(std::byte* to, const std::byte* from, size_t bytes);
 
-/// A buffer on the device with a mapped twin, through which its bytes go.
+/// A buffer on the device with a mapped staging buffer, through which it is written.
 class StagedBuffer {
 public:
   StagedBuffer() = default;
@@ -27,8 +27,7 @@ public:
 
   /// Writes the first bytes of the buffer.
   void write(Commands& commands, std::span<const std::byte> bytes);
-  /// Does the same, but copies only the records that differ from those written before. Returns the number of bytes that
-  /// are copied.
+  /// Like write(), but copies only records that differ from the previous ones. Returns the number of copied bytes.
   uint64_t write_changes(Commands& commands, std::span<const std::byte> bytes, size_t record_bytes);
 
 private:

@@ -60,7 +60,7 @@ struct InstanceRecord {
   uint32_t first_range[2], range_count[2]; ///< by geometry of the structure
 };
 
-/// What all rays of a scene need.
+/// Constants of a scene for all rays.
 struct SceneRecord {
   uint32_t placement_count; ///< the record of the tree over placements follows the last one
   uint32_t material_word;   ///< word of the mask buffer with the materials of placement 0; see MaskedCluster
@@ -90,7 +90,7 @@ struct ViewRecord {
   uint32_t reserved;
 };
 
-/// How an instance's surfaces lie in space: Placement.
+/// The transforms of an instance's surfaces: Placement.
 struct InstanceSurface {
   double unit_from_surface[12]; ///< by column
   float world_from_object[9];   ///< its linear part, by column
@@ -98,7 +98,7 @@ struct InstanceSurface {
 };
 inline constexpr uint32_t kNoInstance = ~0u; ///< in place of an instance's number
 
-/// Where the normals of a cluster lie, and how they are packed: NormalPacking, and a palette.
+/// Offset and packing of the normals of a cluster: NormalPacking, and a palette.
 struct NormalRecord {
   uint32_t place;    ///< first bit | encoding << 20 | chart << 24 | kHasNormals
   uint32_t widths;   ///< of x | y << 5 | chart << 10 | palette index << 13 | number of palette entries << 17
@@ -146,7 +146,7 @@ struct OcclusionRecord {
   uint32_t first_point, point_count;
   uint32_t first_sample, sample_count; ///< numbers in the pixels' sequences
   uint32_t per_thread;                 ///< samples
-  uint32_t idle_lanes;                 ///< a subgroup starts rays once so many lanes have none
+  uint32_t idle_lanes;                 ///< idle lanes from which on a subgroup starts new rays
   uint32_t order;                      ///< OcclusionOrder
   uint32_t seed;                       ///< of the sampler
   float tfar;
@@ -162,7 +162,7 @@ struct OcclusionImageRecord {
   uint32_t nearest; ///< 1: sums of nearest hits; 0: counts of any hits
 };
 
-/// Which sample points a pixel gets, and in which order.
+/// Choice and order of the sample points of a pixel.
 inline constexpr uint32_t kNetOrder = 0;       ///< SamplerKind::kSpaceTimeNet, by number
 inline constexpr uint32_t kDirectionOrder = 1; ///< 256 strata along a curve: neighbouring pixels shoot in one direction
 inline constexpr uint32_t kRandomOrder = 2;    ///< the same strata, in an order of the pixel's own

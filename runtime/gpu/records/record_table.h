@@ -8,8 +8,8 @@
 
 #include "runtime/gpu/records/gpu_records.h"
 
-/// The one description of what both C++ and GLSL read. static_asserts compare GLSL's layout (std430) with that of the
-/// C++ records; gpu_record_generator writes the GLSL.
+/// The only description of the records that both C++ and GLSL read. static_asserts compare GLSL's layout (std430) with
+/// that of the C++ records; gpu_record_generator writes the GLSL.
 namespace packtrace::gpu {
 
 struct GlslField {
@@ -27,7 +27,7 @@ struct GlslRecord {
 /// Size and alignment of a scalar; arrays of scalars have the same alignment in std430.
 constexpr uint32_t scalar_bytes(std::string_view type) { return type == "double" ? 8 : 4; }
 
-/// Whether GLSL gives the fields of a record the offsets and the size that C++ gives them.
+/// Whether the offsets and the size of a record are the same in GLSL and C++.
 constexpr bool same_layout(const GlslRecord& record) {
   uint32_t at = 0, alignment = 4;
   for (const GlslField& field : record.fields) {

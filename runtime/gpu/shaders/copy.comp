@@ -1,5 +1,5 @@
 #version 460
-// Copies words: what reading and writing bytes costs at least.
+// Copies words: a lower bound of the time that reading and writing takes.
 layout(local_size_x = 256) in;
 layout(std430, binding = 0) readonly restrict buffer From { uvec4 from[]; };
 layout(std430, binding = 1) writeonly restrict buffer To { uvec4 to[]; };

@@ -13,7 +13,7 @@ layout(std430, binding = 4) readonly restrict buffer Before { uvec4 guides_befor
 layout(std430, binding = 5) coherent restrict buffer Changes { uint changes[]; };
 
 void main() {
-  // Groups go on through the picture until one has found a change: where much moves, each ends soon.
+  // Groups loop over the image until one has found a change, so they end early if much moves.
   uint stride = gl_NumWorkGroups.x * 256u;
   for (uint i = gl_GlobalInvocationID.x; i < pixel_count() && changes[0] == 0u; i += stride) {
     vec3 normal = vec3(normals[3u * i], normals[3u * i + 1u], normals[3u * i + 2u]);

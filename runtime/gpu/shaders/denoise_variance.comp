@@ -65,7 +65,7 @@ float exp2_of(float x) { // of x in [-100, 0]
 
 struct Variance {
   float of_mean; // that the result has
-  float told;    // that the filter is told
+  float told;    // that the filter uses
 };
 
 Variance variance_of(vec2 slow, float mean_square, uint counts, vec4 sums, bool moves) {

@@ -125,7 +125,7 @@ void flush_leaves(GridRay r, uint tree_flags, uint e0, uint total) {
   my_start &= 0xffffu;
   uint done = 0u, at = 0u;
   while (at < leaves) {
-    // As many leaves as there is room for corners.
+    // Leaves up to the capacity for corners.
     bool lead_in = leads && LANE >= at && end_m - done <= capacity;
     uint batch = bitCount(subgroupBallot(lead_in).x);
     if (batch == 0u) break; // a leaf is larger than kCorners allows

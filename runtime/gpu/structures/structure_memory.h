@@ -12,7 +12,7 @@
 
 namespace packtrace::gpu {
 
-/// Number of an acceleration structure; 0 stands for none.
+/// Number of an acceleration structure; 0: none.
 using StructureNumber = uint64_t;
 
 /// Acceleration structures of a device, many to a memory allocation. All functions may be called from several threads.

@@ -24,7 +24,7 @@ using RtcPtr = std::unique_ptr<T, ReleaseRtc>;
 /// An Embree device that counts its memory, keeps it within a budget, and turns error codes into Error.
 class EmbreeDevice {
 public:
-  /// Allocations beyond the budget fail, and check() says so.
+  /// Allocations beyond the budget fail, which check() reports.
   /// Throws Error(kUnsupported) if the device cannot be made or was built without ray masks, filter functions,
   /// ray streams or triangles.
   explicit EmbreeDevice(const std::optional<MemoryBudget>& budget = std::nullopt);

@@ -38,7 +38,7 @@ struct EmbreeConfig {
 ///
 /// Rays are given in a unit space (space()), which differs from world space by a power-of-two scale and a translation,
 /// so scenes of any scale between 1e-30 and 1e30 work. Geometries that are placed once and untransformed lie in this
-/// space. All others have a unit space of their own and become Embree instances. Placements that float arithmetic
+/// space. All others have their own unit space and become Embree instances. Placements that float arithmetic
 /// cannot invert (flattening, or vastly smaller than the scene) are traced as transformed copies instead. Movers are
 /// always Embree instances; while they are flat, they have a thickness (traceable_placement()).
 /// Each geometry has one RTCGeometry per combination of camera_visible, occludes and needs_mask: ray masks decide about
@@ -100,7 +100,7 @@ private:
     UnitSpace own; ///< its space, if it is instanced
     Bounds bounds; ///< in that space
   };
-  /// The placement and part that a geometry of the top scene stands for.
+  /// The placement and part of a geometry of the top scene.
   struct Attachment {
     uint32_t placement = 0;
     uint32_t part = 0; ///< for an Embree instance: its first part

@@ -125,7 +125,7 @@ void GpuTables::add_exact_vertices(uint32_t cluster, gpu::ClusterRecord& record)
 
 /// Begins the mask buffer: materials of all instances.
 void GpuTables::add_materials() {
-  masks_.assign(1, 0); // word 0 stands for no mask
+  masks_.assign(1, 0); // word 0: no mask
   image_words_.assign(file_.sections().masks.size(), 0);
   const std::span<const Material> materials = source_.materials();
   for (const Material& material : materials)

@@ -21,7 +21,7 @@ class GpuTracer final : public RayTracer, public ViewTracer {
 public:
   /// Keeps references, as PackedTracer does. Throws as PackedTracer and gpu::GpuScene do, and Error(kUnsupported) for
   /// geometry that deforms.
-  /// @param cache with GpuStructures::kDriver: structures that tracers of the file share; null: of its own
+  /// @param cache with GpuStructures::kDriver: structures that tracers of the file share; null: separate ones
   GpuTracer(const BakedFile& file, const SceneSource& source, const GpuConfig& config, const Movers& movers = {},
             std::shared_ptr<StructureCache> cache = nullptr);
   /// Does the same at the detail of a plan, whose trees are made on the CPU.

@@ -50,7 +50,7 @@ bool StructureCache::begin_frame(gpu::RayStructures& builder) {
   return fits;
 }
 
-/// Adds a structure that is to be built, and returns its number.
+/// Adds a structure to build, and returns its number.
 uint32_t StructureCache::add(const StructureKey& key, const gpu::BottomLevel& level) {
   const uint64_t worst_case = gpu::RayStructures::worst_case_bytes(*memory_->device(), level);
   if (unused_numbers_.empty()) {

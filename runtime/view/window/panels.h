@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// What the window shows before the first frame.
+/// Draws the window before the first frame.
 /// @param loading FrameThread::loading()
 void draw_loading(const std::string& file, const std::pair<std::string, double>& loading);
 

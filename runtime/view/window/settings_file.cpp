@@ -49,7 +49,7 @@ private:
     throw Error(ErrorKind::kInput, fmt::format("{}:{}:{}: {}", name_, place.begin.line, place.begin.column, problem));
   }
 
-  /// Calls read(key, value) for each entry; what it does not know or cannot use is an error at the entry's place.
+  /// Calls read(key, value) for each entry; unknown or invalid entries are reported with their position.
   void each(const toml::table& table, const std::string& prefix,
             const std::function<bool(std::string_view, const toml::node&)>& read,
             const std::vector<std::string_view>& known) const {

@@ -47,7 +47,7 @@ void ViewerWindow::State::toggle_full_screen() {
   glfwSetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
 
-/// Tells the session the window's size.
+/// Passes the window's size to the session.
 void ViewerWindow::State::follow_size() {
   const ImageSize now = framebuffer_size(window);
   if (now == size) return;

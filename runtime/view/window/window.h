@@ -8,7 +8,7 @@
 
 namespace packtrace {
 
-/// What a window asks of the program. The tasks run in the frame thread.
+/// Callbacks of a window into the program. They run in the frame thread.
 struct WindowActions {
   FrameThread::Task screenshot, record, profile, save_settings;
   /// A click. Runs in the frame thread, too.

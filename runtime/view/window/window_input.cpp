@@ -25,7 +25,7 @@ constexpr KeyName kKeyNames[] = {
     {GLFW_KEY_HOME, "home"},        {GLFW_KEY_PAGE_UP, "pageup"},      {GLFW_KEY_PAGE_DOWN, "pagedown"},
     {GLFW_KEY_LEFT_SHIFT, "shift"}, {GLFW_KEY_RIGHT_SHIFT, "shift"}};
 
-/// The name of a key for ViewControls; empty for keys that it cannot know.
+/// The name of a key for ViewControls; empty for unknown keys.
 std::string key_name(int key) {
   if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) return {static_cast<char>('a' + (key - GLFW_KEY_A))};
   if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9) return {static_cast<char>('0' + (key - GLFW_KEY_0))};

@@ -38,7 +38,7 @@ private:
   GLuint texture_ = 0;
 };
 
-/// What the window holds. All functions run in the thread of the window.
+/// State of the window. All functions run in its thread.
 struct ViewerWindow::State {
   GLFWwindow* window = nullptr;
   std::string device, title, file;
@@ -48,7 +48,7 @@ struct ViewerWindow::State {
   const WindowActions* actions = nullptr;
   std::shared_ptr<const ViewSnapshot> shown;
   ImageSize size;
-  // Keys and mouse, which wait until the panels know where the mouse is.
+  // Input events, which are handled after the panels have the position of the mouse.
   struct InputEvent {
     enum class Kind : uint8_t { kKey, kButton, kMouse } kind = Kind::kMouse;
     int code = 0, action = 0, mods = 0;

@@ -149,7 +149,7 @@ AoFrame striped_means(uint32_t samples, uint32_t number) {
   return frame;
 }
 
-/// RMSE after some frames of means of `samples`, of which the denoiser is told.
+/// RMSE after some frames of means of `samples`, a number that is passed to the denoiser.
 double striped_error(uint32_t samples, uint32_t told, uint32_t frames) {
   AoDenoiser denoiser;
   const DenoisedAo* result = nullptr;

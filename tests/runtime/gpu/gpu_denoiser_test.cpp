@@ -142,7 +142,7 @@ TEST_F(GpuDenoiserTest, Orbit) {
   ThicketView view;
   BothDenoisers both(config_);
   for (uint32_t f = 0; f < 12; ++f) {
-    const double angle = 0.012 * std::min(f, 8u); // then it stands still, which the denoiser has to find out
+    const double angle = 0.012 * std::min(f, 8u); // then it stands still, which the denoiser must detect
     view.look_from({12.0 * std::sin(angle), 3.0 + 0.05 * std::min(f, 8u), -12.0 * std::cos(angle)});
     view.sample(f);
     both.add(view.gbuffer, view.ao);

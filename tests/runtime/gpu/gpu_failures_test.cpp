@@ -1,4 +1,4 @@
-// What backend gpu says where it cannot work. It never falls back to another backend.
+// Errors of backend gpu where it cannot work. It never falls back to another backend.
 
 #include <gtest/gtest.h>
 

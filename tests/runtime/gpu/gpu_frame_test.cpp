@@ -116,7 +116,7 @@ TEST_F(GpuFrameTest, AQuarterOfThePixels) {
 
 TEST_F(GpuFrameTest, WithoutDenoiser) {
   settings_.denoise = false;
-  settings_.denoiser.kind = DenoiserKind::kReference; // nobody asks for it
+  settings_.denoiser.kind = DenoiserKind::kReference; // never denoised
   expect_same_pictures();
 }
 

@@ -302,7 +302,7 @@ TEST(AoFrames, MissesAreInvalidEvenOverOldContents) {
   }
 }
 
-/// Cancellation is process-wide and cannot be undone, so these tests run in processes of their own.
+/// Cancellation is process-wide and cannot be undone, so these tests run in separate processes.
 TEST(AoFrames, CancellingStopsWithinATile) {
   struct Guard {
     static void run() {

@@ -6,7 +6,7 @@
 
 namespace packtrace {
 
-/// What one user primitive of Embree stands for.
+/// Contents of one user primitive of Embree.
 enum class ClusterPrimitives : uint8_t {
   kClusters,  ///< a cluster: less memory
   kLeafNodes, ///< a node of up to eight leaves, of which a cluster has a few: faster

@@ -91,7 +91,7 @@ struct Errors {
   }
 };
 
-/// Adds what the G-buffer says about moved points minus what the decoded triangles say.
+/// Adds the difference of moved points between the G-buffer and the decoded triangles.
 void add_errors(const SceneSource& source, const DecodedSource& decoded, const GBuffer& g, std::span<const Affine> now,
                 std::span<const Affine> before, const PrimaryCamera& camera_before, Errors& errors) {
   for (size_t pixel = 0; pixel < g.size.pixels(); ++pixel) {

@@ -12,7 +12,7 @@ namespace {
 
 using test::ViewBench;
 
-/// The image of so many frames of a frame loop of its own, which is what `render` writes.
+/// The image of this many frames of a separate frame loop, as `render` writes it.
 RenderedImage still(const ViewBench& bench, const FrameConfig& config, const Camera& camera, uint32_t frames) {
   FrameLoop loop({&bench.source(), nullptr, {}}, config);
   RenderedImage image;

@@ -9,7 +9,7 @@ namespace {
 
 using test::ViewBench;
 
-/// The image of so many frames of a frame loop of its own, which is what `render --view` writes.
+/// The image of this many frames of a separate frame loop, as `render --view` writes it.
 RenderedImage shaded_still(const ViewBench& bench, FrameView view, const ShadeConfig& shade, uint32_t frames) {
   FrameConfig config = ViewBench::config().frame;
   config.ao.radius = ao_radius(config.ao, bench.source().world_bounds());

@@ -45,7 +45,7 @@ Polygon cut(const Polygon& in, DVec3 direction, double limit) {
   return out;
 }
 
-/// The region around a triangle that holds what the triangle stands for: bounded by its plane and its three sides.
+/// The region around a triangle that contains the surface that it represents: bounded by its plane and its three sides.
 class Neighbourhood {
 public:
   explicit Neighbourhood(const Corners& c) {
@@ -138,7 +138,7 @@ private:
     return {in_.points[p.x], in_.points[p.y], in_.points[p.z]};
   }
 
-  /// Replaces numbers_ by the triangles one level below that they may stand for, keeping only triangles whose bounds,
+  /// Replaces numbers_ by the triangles one level below that they may represent, keeping only triangles whose bounds,
   /// padded by their error, overlap the box. Returns false and leaves numbers_ unchanged where no lower level is known.
   bool go_back(const DVec3& lo, const DVec3& hi) {
     below_.clear();
@@ -199,7 +199,7 @@ private:
     return std::max(largest, worst);
   }
 
-  /// Bounds the error of the part of lower-level triangle `below` that source triangle t stands for. Appends the
+  /// Bounds the error of the part of lower-level triangle `below` that source triangle t represents. Appends the
   /// simplified triangles that it was measured against to worst_pieces_.
   double measure_below(uint32_t t, const Neighbourhood& near, uint32_t below, uint32_t depth, double stated) {
     const double error = in_.levels.errors[below], enough = (limit() - error) / kErrorInflation;

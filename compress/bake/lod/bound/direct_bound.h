@@ -24,7 +24,7 @@ struct DirectBoundInput {
 /// The triangles with the largest errors are measured directly against the triangles of up to TriangleHistory::kDepth
 /// lower levels, in both directions, while that lowers the largest error.
 ///
-/// The part of the original surface that a source triangle stands for lies within the triangle's error on the
+/// The part of the original surface that a source triangle represents lies within the triangle's error on the
 /// lower-level triangles that it goes back to (TriangleHistory). These are clipped to that neighbourhood and overlaid
 /// on the simplified surface. Simplified triangles are measured against all lower-level triangles that their linked
 /// source triangles go back to.

@@ -16,7 +16,7 @@ struct GroupError {
   static constexpr double kFine = 0.5;  ///< lattice steps; smaller distances are accepted as they are
 
   double largest = 0.0; ///< largest error bound accepted so far
-  double proven = 0.0;  ///< lower bound of the group's error, as far as the candidates tell
+  double proven = 0.0;  ///< lower bound of the group's error, given the candidates
 
   double limit() const { return std::max(largest, kSlack * proven); }
   bool enough(double distance, double inherited) const {

@@ -24,7 +24,8 @@ struct SurfaceLinks {
   LinkLists by_simplified(size_t count) const;
 
   std::vector<SurfaceLink> links; ///< may contain duplicates
-  /// Per source triangle: maximum distance of what it stands for from the simplified triangles that it is linked to.
+  /// Per source triangle: maximum distance of the surface that it represents from the simplified triangles that it is
+  /// linked to.
   std::vector<double> bounds;
 };
 

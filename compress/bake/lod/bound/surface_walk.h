@@ -45,7 +45,7 @@ public:
     State state = State::kUnknown;
   };
 
-  /// All arguments must outlive this object. mesh.side_edges says which edges the source triangles share.
+  /// All arguments must outlive this object. mesh.side_edges lists the edges that source triangles share.
   SurfaceWalk(const OverlaySurface& source, const SurfaceSide& simplified, const SimplifyMesh& mesh);
 
   const Place& place(uint32_t source) {

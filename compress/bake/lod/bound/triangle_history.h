@@ -9,7 +9,7 @@
 
 namespace packtrace {
 
-/// Lists, for each triangle of a coarser level, the triangles one level below that it may stand for. Keeps the last
+/// Lists, for each triangle of a coarser level, the triangles one level below that it may represent. Keeps the last
 /// kDepth levels only.
 class TriangleHistory {
 public:

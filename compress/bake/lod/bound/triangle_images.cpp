@@ -208,7 +208,7 @@ double TriangleImages::area(uint32_t interval, const DVec3& reference) const {
     sum += glm::cross(outline_.points[i] - reference, outline_.points[i + 1] - reference);
   uint32_t next = interval + 1;
   while (at(next).triangle != triangle) ++next;
-  // The outline comes back through the side where it left: closes the interval along that side.
+  // The outline returns through the side where it left: closes the interval along that side.
   if (next == interval + 1 || at(interval + 1).triangle == at(next - 1).triangle)
     sum += glm::cross(outline_.points[end - 1] - reference, outline_.points[at(next).first_point] - reference);
   return glm::dot(sum, walk_.area_normal(triangle));

@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// What is left of a triangle after parts of it over other triangles were taken away, as convex polygons. Parts are
+/// A triangle minus its parts over other triangles, as convex polygons. Parts are
 /// exact, so triangles that cover a flat part leave nothing of it, however their borders cross it.
 class TriangleSubtraction {
 public:

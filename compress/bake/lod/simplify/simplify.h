@@ -20,7 +20,7 @@ struct LodTriangle {
   Triangle points;    ///< point numbers, distinct
   Triangle wedges;    ///< wedge numbers; Wedge::kNone where the kind has no attributes
   uint32_t kind = 0;  ///< seams between kinds with different seam_of_kind are mostly preserved
-  double error = 0.0; ///< maximum distance from the original surface that it stands for, both ways
+  double error = 0.0; ///< maximum two-sided distance from the part of the original surface that it represents
 };
 
 /// Input of simplify(), and its result. Coordinates are integers: lattice steps relative to a nearby origin. Moved

@@ -20,7 +20,7 @@ class DeformedTrees {
 public:
   DeformedTrees() = default;
   /// @param traced trees over LOD level 0
-  /// Throws Error(kInput) if a geometry does not exist, occurs twice or has no tree of its own.
+  /// Throws Error(kInput) if a geometry does not exist, occurs twice or lies in the world's tree.
   DeformedTrees(const BakedFile& file, std::span<const DeformingGeometry> deforming, const DeformConfig& config,
                 const TracedTrees& traced);
 

@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// The clusters of one geometry in memory of their own, so that their vertices can move: strips as in the file,
+/// A copy of the clusters of one geometry whose vertices can move: strips as in the file,
 /// followed by position fields that are rewritten for each frame. A cluster's anchor and widths follow the frame.
 class DeformingClusters {
 public:

@@ -30,9 +30,9 @@ public:
   /// Does the same at the detail of a plan: builds one tree per BLAS, except that all world-space geometries, which
   /// have one instance each, share one tree.
   PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa(), const Movers& movers = {});
-  /// Traces geometries whose vertices move: each has clusters and nodes of its own, which deform() changes. They begin
-  /// with the vertices of the file.
-  /// @param deforming distinct geometries with clusters that have trees of their own (none in the world's tree)
+  /// Traces geometries whose vertices move: each has a copy of its clusters and nodes, which deform() changes. They
+  /// begin with the vertices of the file.
+  /// @param deforming distinct geometries with clusters and with their own trees (none in the world's tree)
   /// Also throws Error(kInput) for other geometries, and as DeformedTree's constructor does.
   PackedTracer(const BakedFile& file, const SceneSource& source, std::span<const DeformingGeometry> deforming,
                const DeformConfig& config = {}, PackedIsa isa = chosen_isa(), const Movers& movers = {});
@@ -75,7 +75,7 @@ public:
   /// Throws as DeformedTree::update() does.
   DeformStep deform(uint32_t geometry, const FrameVertices& frame);
   /// Like deform() for several geometries; the tree over placements is updated once.
-  /// @param steps as many elements as frames
+  /// @param steps one element per frame
   void deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps);
 
   /// Places all instances again, at the source's transforms, after some refer to other geometries of their level chain
