@@ -8,10 +8,10 @@
 
 namespace packtrace {
 
-// What kernels, on the CPU and on GPUs, are told of a configuration.
+// Parameters of the kernels, on the CPU and on GPUs, for a configuration.
 
 /// LocateTerms::depth.
-/// @param knows_previous_z whether GBuffer::previous_z is there
+/// @param knows_previous_z whether GBuffer::previous_z is available
 float located_depth(const FluxConfig& config, bool knows_previous_z);
 
 /// LocateTerms::longest_moving.

@@ -30,7 +30,7 @@ inline constexpr float kMaxPrecision = 1000.0f * kPrecisionUnits;
 
 /// 0.707 and 0.499 in units of 2^-16, per unit of a guide weight.
 inline constexpr uint16_t kStraight = 182, kDiagonal = 128;
-/// A sample unlike all its neighbours gives way by kLoneBase + kLoneYoung / n, where n is the number of samples.
+/// A sample unlike all its neighbours loses the weight kLoneBase + kLoneYoung / n, where n is the number of samples.
 inline constexpr float kLoneBase = 0.7f, kLoneYoung = 0.3f;
 inline constexpr float kMaxVariance = 0.25f; ///< of values in [0, 1]
 /// In units of 1 / kPrecisionUnits; the sum of nine squares fits.
@@ -116,7 +116,7 @@ struct HistoryOfRow {
 struct FirstRow {
   int16_t* value;
   uint16_t* precision; ///< lower while there are few frames, and the lowest without history
-  uint16_t* lone;      ///< how much a sample unlike all its neighbours gives way, in units of 2^-13
+  uint16_t* lone;      ///< weight that a sample unlike all its neighbours loses, in units of 2^-13
 };
 
 struct VarianceTerms {
@@ -125,8 +125,8 @@ struct VarianceTerms {
   /// Variance of a mean times n / s2: still_factor n^-still_power if still, moving_base + moving_gain n if moving.
   float still_factor = 1, still_power = 0, moving_base = 1, moving_gain = 0, longest_moving = 0;
   float ratio_prior = 1; ///< weight of still_factor against the window's trends, in pixels
-  /// 1 / N, where each frame's value is the mean of N samples. The filter is told
-  /// 1 + young / (N n) + distrust / (N n)^2 times the variance of n frames.
+  /// 1 / N, where each frame's value is the mean of N samples. The filter assumes 1 + young / (N n) + distrust / (N
+  /// n)^2 times the variance of n frames.
   float per_sample = 1, young = 0, distrust = 0;
   /// If N > 1, the variance of a value is at most most_spread m (1 - m) around a mean of m, since samples are between 0
   /// and 1; what varies more is the occlusion itself.

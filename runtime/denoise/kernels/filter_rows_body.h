@@ -199,7 +199,7 @@ void normalise_first_row(int width, int step, const WeightRow& here, const Weigh
   invert_row(width, 8192.0f * 8192.0f, scale);
 }
 
-/// @param variance what is left of the variance, in units of 2^-14
+/// @param variance relative remaining variance, in units of 2^-14
 void raise_precisions(int width, const uint16_t* variance, const uint16_t* before, uint16_t* precision) {
 #pragma GCC ivdep
   for (int x = 0; x < whole_vectors(width); ++x) {
