@@ -8,6 +8,7 @@
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_validation.h"
 #include "compress/format/file/section_table.h"
+#include "compress/format/layout/bit_stream.h"
 #include "compress/format/motion/deformation_validation.h"
 #include "compress/format/motion/rigid_motion_validation.h"
 #include "compress/format/trees/tree_validation.h"
