@@ -12,7 +12,7 @@
 namespace packtrace {
 
 /// Finds the mesh of a scene that a sequence of PLY files moves. Frame 0 is the file that the scene refers to; the
-/// frames after it have the numbers that follow, up to the first missing one. Files are read when a frame is asked for.
+/// frames after it have the numbers that follow, up to the first missing one. Files are read on demand.
 /// @param files all files that the scene names (ImportResult::files)
 /// @param main_file of the scene: a relative pattern is looked up in the working directory, then in the scene's folder
 /// @param pattern as FramePattern

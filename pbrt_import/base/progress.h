@@ -26,7 +26,7 @@ public:
   /// Throws Error(kCancelled) if cancel() was called.
   void check_cancelled() const;
 
-  /// Asks all running operations of the process to stop. Async-signal-safe.
+  /// Requests all running operations of the process to stop. Async-signal-safe.
   static void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
   static bool cancelled() { return cancelled_.load(std::memory_order_relaxed); }
 

@@ -22,7 +22,7 @@ struct SettingInfo {
   SettingRule rule = SettingRule::kAny;
 };
 
-/// A number or switch of a configuration struct. A table of them is the one description of the struct's fields: ranges
+/// A number or switch of a configuration struct. A table of them is the only description of the struct's fields: ranges
 /// are checked, help is written and values are assigned from it. The default is the field's value in Config{}.
 template <typename Config>
 struct Setting {

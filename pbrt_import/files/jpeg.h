@@ -24,7 +24,7 @@ public:
   uint64_t working_bytes() const;
   /// Next row from the top: RGB, 3 bytes per pixel; valid until the next call. Throws Error(kInput).
   std::span<const uint8_t> read_row();
-  /// What the decoder tolerated so far, such as missing data at the end of the file; empty if nothing.
+  /// Damage that the decoder has tolerated so far, such as missing data at the end of the file; empty if none.
   std::string problem() const;
 
 private:

@@ -7,7 +7,7 @@
 
 namespace packtrace {
 
-/// Reads a WebP file, lossy or lossless; of animations nothing.
+/// Reads a WebP file, lossy or lossless; rejects animations.
 class WebpReader {
 public:
   /// Reads the header. Throws Error(kInput), with a message without file name, if it is damaged or of an animation.

@@ -12,7 +12,7 @@
 
 namespace packtrace::gltf {
 
-/// What an animation sets of a node at a time.
+/// Values that an animation sets for a node at a time.
 struct AnimatedValues {
   std::optional<std::vector<double>> translation, rotation, scale, weights;
 };

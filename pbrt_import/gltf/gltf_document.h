@@ -44,13 +44,13 @@ public:
   /// Place for messages about the document: it has no lines that matter.
   Place place() const { return {file_number_, 0, 0}; }
   const MeshFileContext& context() const { return context_; }
-  /// Grows with all memory that is kept of the document.
+  /// Reservation for all memory of the document.
   MemoryReservation& memory() { return memory_; }
   /// Counts the values of accessors that are in use; see ValuesInUse.
   MemoryReservation& values_memory() { return values_memory_; }
 
 private:
-  /// What was read once, or why it could not be.
+  /// Data that are read once, or the reason why they could not be read.
   struct Content {
     std::span<const std::byte> bytes;
     std::string problem; ///< empty: none

@@ -11,10 +11,10 @@
 
 namespace packtrace::gltf {
 
-/// The frames of a primitive that morph targets and a skin deform. A frame is evaluated when it is asked for.
+/// The frames of a primitive that morph targets and a skin deform. Frames are evaluated on demand.
 class PosedFrames final : public MeshFrames {
 public:
-  /// What all frames share.
+  /// Data that all frames share.
   struct Source {
     std::vector<float> positions;            ///< without morph targets and skin, 3 per vertex
     std::vector<std::vector<float>> targets; ///< displacements of each morph target; empty if its weight is always 0

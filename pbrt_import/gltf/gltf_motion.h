@@ -12,7 +12,7 @@
 
 namespace packtrace::gltf {
 
-/// How something moves: world(t) = track(t) inner.
+/// Motion of an instance or a camera: world(t) = track(t) inner.
 struct NodeMotion {
   uint32_t track = kNoTrack; ///< number that the feed gave the track
   DAffine inner{1.0};

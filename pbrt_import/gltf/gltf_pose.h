@@ -14,7 +14,7 @@ namespace packtrace::gltf {
 /// Maps of joints from where the mesh is bound to the world.
 using JointMaps = std::shared_ptr<const std::vector<DAffine>>;
 
-/// What deforms a mesh in each frame of its animation.
+/// Weights and joint maps that deform a mesh in each frame of its animation.
 struct PoseFrames {
   uint32_t count = 0;                       ///< at least 2
   double frames_per_second = 0.0;           ///< count / span of the animation, so that both repeat together
@@ -23,7 +23,7 @@ struct PoseFrames {
   MemoryReservation memory{};               ///< of weights and joints
 };
 
-/// What deforms a mesh at the scene's time.
+/// Weights and joint maps that deform a mesh at the scene's time.
 struct Pose {
   std::span<const double> weights;          ///< of morph targets, of the placed node; empty: the mesh's own
   JointMaps joints;                         ///< of the skin; null: no skin

@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// What a pbrt material is reduced to for shading, with textures still as graph nodes; SurfaceShading has their
+/// A pbrt material reduced to its shading, with textures still as graph nodes; SurfaceShading has their
 /// averages.
 struct ShadingRecipe {
   using Node = TextureGraph::Node;

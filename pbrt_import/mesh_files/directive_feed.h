@@ -43,8 +43,7 @@ public:
   void transform(std::string_view keyword, const Place& place, const DAffine& map);
   /// Adds a track for moves(); returns its number.
   uint32_t add_track(MotionTrack track) { return builder_.add_track(std::move(track)); }
-  /// Moves the ObjectInstance or Camera that is being made. Where it stands at the scene's time, the current transform
-  /// says.
+  /// Moves the ObjectInstance or Camera that is being made. The current transform is its place at the scene's time.
   void moves(const TrackedMotion& motion) { directive_.motion = motion; }
   /// Gives frames to the mesh of the current Shape, whose positions must be those of frame 0.
   void deforms(const MeshSequence& sequence) { directive_.sequence = builder_.add_sequence(sequence); }

@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// What readers of mesh files share.
+/// Shared state of the readers of mesh files.
 struct MeshFileContext {
   const ImportOptions& options;
   DirectiveFeed& feed;

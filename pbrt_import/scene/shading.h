@@ -25,7 +25,7 @@ inline constexpr ShadingBits kTransmissionTimesAlbedo = 1u << 4;
 inline constexpr ShadingBits kOuterSideOpposite = 1u << 5;
 inline constexpr ShadingBits kAllShadingBits = (1u << 6) - 1;
 
-/// What a pbrt material is reduced to for shading (docs/shading.md). Colours are linear sRGB, components not negative.
+/// A pbrt material reduced to its shading (docs/shading.md). Colours are linear sRGB, components not negative.
 struct SurfaceShading {
   ShadingBits bits = 0;
   float diffuse = 1.0f;    ///< [0,1]: the diffuse colour is this times the albedo at the hit

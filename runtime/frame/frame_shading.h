@@ -32,7 +32,7 @@ public:
   };
 
   /// Lights, materials and mip levels of textures, made at the first call.
-  /// @param memory reserves the memory of the levels; null: no limit
+  /// @param memory reserves the memory of the levels; unset: no limit
   /// Throws MemoryError.
   const ShadeScene& prepare(const SceneSource& source, const std::optional<MemoryBudget>& memory);
   /// Result of prepare(); null before.

@@ -26,7 +26,7 @@ struct FrameScene {
   const SceneMotion* motion = nullptr; ///< of the instances; null: none moves
   bool deforms = false;                ///< plays the deforming meshes of `file`, again and again; backend packed only
   Bounds motion_bounds = {};           ///< of all moving instances at all times; empty: those of `motion`
-  std::optional<MemoryBudget> memory = {}; ///< reserves the memory of mip levels of textures; null: no limit
+  std::optional<MemoryBudget> memory = {}; ///< reserves the memory of mip levels of textures; unset: no limit
 };
 
 /// A scene at the time of a frame, ready to be traced: places of instances, vertices of deforming meshes, levels by

@@ -34,7 +34,7 @@ bool set_backend(TracerConfig& config, std::string_view name);
 /// The name for set_backend().
 std::string_view backend_name(const TracerConfig& config);
 
-/// What tracers of a scene with this config should share as TracerConfig::structures; null if they share nothing.
+/// The structures that tracers of a scene with this config share as TracerConfig::structures; null if none.
 /// Throws as StructureCache's constructor does.
 std::shared_ptr<StructureCache> make_structure_cache(const TracerConfig& config);
 

@@ -13,7 +13,7 @@ struct RayFootprint {
   float width;    ///< of the cone at the hit; 0: a point
 };
 
-/// How the colours that camera rays see are filtered.
+/// Filter of the colours that camera rays see.
 struct TextureFilter {
   const TexturePyramids* pyramids = nullptr; ///< of the source; null: textures are looked up at points
   float width_px = 1.0f;                     ///< side of the square of the image that a camera ray covers

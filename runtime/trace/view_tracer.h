@@ -80,7 +80,7 @@ struct OcclusionPicture {
   double radius = 0.0; ///< of occlusion, in the units of hit distances
 };
 
-/// A tracer that is fast only if it gets the rays of a whole picture at once. All functions may be called from several
+/// A tracer that is fast only for the rays of a whole picture at once. All functions may be called from several
 /// threads and throw Error(kCancelled) within a part of a second.
 class ViewTracer {
 public:
@@ -112,7 +112,7 @@ public:
   /// Reads the points of such surfaces.
   virtual PointPlanes read_points(const gpu::DeviceView& picture, bool with_normals) const = 0;
 
-  /// Makes the occlusion rays of all points and sums up what they meet: the bits that trace_ao() computes from spans of
+  /// Makes the occlusion rays of all points and sums up their results: the bits that trace_ao() computes from spans of
   /// rays.
   /// @param sums as many as points
   /// @param progress advances by the number of points

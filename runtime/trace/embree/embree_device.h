@@ -33,9 +33,9 @@ public:
 
   RTCDevice get() const { return device_.get(); }
 
-  /// Takes what the device holds now from the budget.
-  /// Throws what was reported since the last call: MemoryError for allocations beyond the budget, Error(kLimitExceeded)
-  /// where the system had no memory, Error(kCancelled) for a build that was stopped, else Error(kUnsupported).
+  /// Reserves the memory that the device holds now from the budget. Throws errors that were reported since the last
+  /// call: MemoryError for allocations beyond the budget, Error(kLimitExceeded) where the system had no memory,
+  /// Error(kCancelled) for a build that was stopped, else Error(kUnsupported).
   void check();
 
   /// Bytes currently allocated.

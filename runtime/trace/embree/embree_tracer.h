@@ -27,7 +27,7 @@ struct EmbreeConfig {
   bool compact = false; ///< smaller and slower trees
   /// Tests hits of thin triangles again in double precision. Embree alone lets rays hit the sliver that they start on.
   bool check_slivers = true;
-  /// Pays for vertices, indices and trees; no limit without one.
+  /// Reserves memory for vertices, indices and trees; unset: no limit.
   std::optional<MemoryBudget> memory = std::nullopt;
 };
 

@@ -14,10 +14,10 @@
 
 namespace packtrace {
 
-/// What a bottom-level structure was built from: its ray classes, the grid of its tree, and its clusters.
+/// Input from which a bottom-level structure was built: its ray classes, the grid of its tree, and its clusters.
 using StructureKey = std::vector<uint64_t>;
 
-/// What a StructureCache did so far, and holds.
+/// Statistics of a StructureCache.
 struct StructureStats {
   uint64_t built = 0, compacted = 0, dropped = 0; ///< structures
   uint64_t built_triangles = 0;

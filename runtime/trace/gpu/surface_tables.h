@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// What a GPU needs of a scene to make the surfaces of hits: see gpu::DeviceRays::set_surfaces().
+/// Tables of a scene from which a GPU makes the surfaces of hits: see gpu::DeviceRays::set_surfaces().
 struct SurfaceTables {
   std::vector<gpu::InstanceSurface> instances; ///< by instance; zeros for those that cannot be hit
   std::vector<uint32_t> lookup;

@@ -15,7 +15,7 @@ namespace packtrace {
 class TexturePyramids {
 public:
   /// @param source must outlive this object
-  /// @param memory pays for the levels, and for one in floats while they are made; no limit without one
+  /// @param memory reserves the levels, and one in floats while they are made; unset: no limit
   /// Throws MemoryError before anything is made.
   explicit TexturePyramids(const SceneSource& source, const std::optional<MemoryBudget>& memory = {});
 

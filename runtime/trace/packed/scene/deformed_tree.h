@@ -30,7 +30,7 @@ struct DeformConfig {
   void validate() const;
 };
 
-/// What a new frame did to a tree.
+/// Effect of a new frame on a tree.
 struct DeformStep {
   bool rebuilt = false;
   double growth = 1.0; ///< area of the refitted tree relative to the tree built last; see DeformedTree::area()

@@ -23,7 +23,7 @@ public:
   /// Seconds from frame 0 to the last frame of the longest animation; 0 if nothing deforms.
   double duration() const { return duration_; }
 
-  /// What set_time() did.
+  /// Result of set_time().
   struct Update {
     bool moved = false;         ///< the time changed some vertices of used geometries
     uint32_t rebuilt_trees = 0; ///< instead of refitted
@@ -32,7 +32,7 @@ public:
   };
 
   /// Moves geometries to a time. PackedTracer::previous_vertices() then gives the vertices at the time of the call
-  /// before, also of geometries that were not used then. Nothing is done for those that are as they should be.
+  /// before, also of geometries that were not used then. Geometries that are up to date are skipped.
   /// @param repeat whether animations begin again after their last frame
   /// @param used by geometry: others may stay as they are until they are used again; empty: all are used
   /// Throws as PackedTracer::deform() does: Error(kInput) if a damaged file has vertices outside its box.

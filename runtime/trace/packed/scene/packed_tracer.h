@@ -105,7 +105,7 @@ public:
   std::span<const baked::TreeRecord> tree_records() const;
   std::span<const packed::TraceTree> trees() const;
 
-  /// What the kernels read, for other tracers of the same trees. Valid until instances or geometry change.
+  /// The input of the kernels, for other tracers of the same trees. Valid until instances or geometry change.
   const packed::KernelScene& kernel_scene() const;
   const TracedTrees& traced_trees() const;
   const PlacedTrees& placed_trees() const;
