@@ -13,7 +13,7 @@ import tempfile
 import unittest
 
 from browser import Browser, find_chromium
-from sample_report import HOSTILE, png, sample
+from sample_report import HOSTILE, ao, png, sample
 
 WRITER, AXE, SCREENSHOTS = "", "", None
 
