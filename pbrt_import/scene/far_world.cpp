@@ -40,55 +40,56 @@ DAffine moved(DAffine map, DVec3 by) {
 
 class Mover {
 public:
-  Mover(Scene& scene, std::span<const Affine> residuals) : scene_(scene) {
+  Mover(Scene& scene, std::span<const Affine> residuals) : scene_(scene), residuals_(residuals) {
     for (const Mesh& mesh : scene.meshes) meshes_.push_back(bounds_of(mesh.positions));
-    maps_.reserve(scene.instances.size());
-    for (size_t i = 0; i < scene.instances.size(); ++i) {
-      DAffine map(scene.instances[i].world_from_object);
-      if (!residuals.empty()) map += DAffine(residuals[i]);
-      maps_.push_back(map);
-    }
   }
 
   void run() {
-    const bool objects_moved = move_objects();
+    objects_moved_ = move_objects();
     Bounds world = bounds_of_shapes(scene_.shapes, meshes_);
-    for (size_t i = 0; i < maps_.size(); ++i)
-      world.extend(transform_bounds(maps_[i], object_boxes_[scene_.instances[i].object]));
+    for (size_t i = 0; i < scene_.instances.size(); ++i)
+      world.extend(transform_bounds(map(i), object_boxes_[scene_.instances[i].object]));
     const DVec3 origin = new_zero(world, kFarWorld);
     if (origin != DVec3(0.0)) move_world(origin);
-    if (!objects_moved && origin == DVec3(0.0)) return; // every bit stays as it was
-    for (size_t i = 0; i < maps_.size(); ++i) scene_.instances[i].world_from_object = Affine(maps_[i]);
+    if (!objects_moved_ && origin == DVec3(0.0)) return; // every bit stays as it was
+    for (size_t i = 0; i < scene_.instances.size(); ++i)
+      scene_.instances[i].world_from_object = Affine(moved(map(i), -origin));
   }
 
 private:
+  /// world_from_object of an instance in doubles, after its object's shapes have moved. Computed when it is needed,
+  /// because an array of all maps takes more memory than the instances.
+  DAffine map(size_t i) const {
+    const Instance& instance = scene_.instances[i];
+    DAffine map(instance.world_from_object);
+    if (!residuals_.empty()) map += DAffine(residuals_[i]);
+    if (objects_moved_) map[3] = transform_point(map, zeros_[instance.object]);
+    return map;
+  }
+
   bool move_objects() {
-    std::vector<DVec3> zeros(scene_.objects.size(), DVec3(0.0));
-    for (size_t i = 0; i < zeros.size(); ++i) {
+    zeros_.assign(scene_.objects.size(), DVec3(0.0));
+    for (size_t i = 0; i < zeros_.size(); ++i) {
       object_boxes_.push_back(bounds_of_shapes(scene_.objects[i].shapes, meshes_));
-      zeros[i] = new_zero(object_boxes_[i], kFarObject);
+      zeros_[i] = new_zero(object_boxes_[i], kFarObject);
     }
     for (const AnimatedInstance& animated : scene_.animated_instances)
-      zeros[scene_.instances[animated.instance].object] = DVec3(0.0);
+      zeros_[scene_.instances[animated.instance].object] = DVec3(0.0);
     for (const InstanceMotion& moving : scene_.motion.instances)
-      zeros[scene_.instances[moving.instance - scene_.shapes.size()].object] = DVec3(0.0);
+      zeros_[scene_.instances[moving.instance - scene_.shapes.size()].object] = DVec3(0.0);
     bool any = false;
-    for (size_t i = 0; i < zeros.size(); ++i) {
-      if (zeros[i] == DVec3(0.0)) continue;
+    for (size_t i = 0; i < zeros_.size(); ++i) {
+      if (zeros_[i] == DVec3(0.0)) continue;
       any = true;
-      move_shapes(scene_.objects[i].shapes, zeros[i]);
-      object_boxes_[i].lo -= zeros[i], object_boxes_[i].hi -= zeros[i];
+      move_shapes(scene_.objects[i].shapes, zeros_[i]);
+      object_boxes_[i].lo -= zeros_[i], object_boxes_[i].hi -= zeros_[i];
     }
-    if (any)
-      for (size_t i = 0; i < maps_.size(); ++i)
-        maps_[i][3] = transform_point(maps_[i], zeros[scene_.instances[i].object]);
     return any;
   }
 
   void move_world(DVec3 origin) {
     scene_.origin = origin;
     move_shapes(scene_.shapes, origin);
-    for (DAffine& map : maps_) map[3] -= origin;
     for (AnimatedInstance& animated : scene_.animated_instances) move_animation(animated.animation, origin);
     move_tracks(origin);
     for (Camera& camera : scene_.cameras) {
@@ -130,8 +131,10 @@ private:
   }
 
   Scene& scene_;
+  std::span<const Affine> residuals_; ///< as in move_far_world()
   std::vector<Bounds> meshes_, object_boxes_;
-  std::vector<DAffine> maps_; ///< by instance: world_from_object in doubles
+  std::vector<DVec3> zeros_;   ///< by object: the point that becomes its zero
+  bool objects_moved_ = false; ///< whether a zero differs from 0; then map() applies them
   std::map<std::pair<uint32_t, std::array<double, 3>>, uint32_t> animations_;
 };
 
