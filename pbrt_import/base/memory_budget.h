@@ -65,6 +65,7 @@ public:
   MemoryReservation& operator=(MemoryReservation&& other) noexcept;
 
   uint64_t bytes() const { return bytes_; }
+  bool has_budget() const { return budget_.has_value(); }
 
   /// Sets the size of the reservation. If the budget has too little left, throws MemoryError, "WHAT needs N GiB of
   /// memory, of M GiB left; ...", and changes nothing.

@@ -1,5 +1,6 @@
 #include "pbrt_import/builder/scene_pruning.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -50,6 +51,7 @@ std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& res
     if (!shown[i] && !scene.objects[i].shapes.empty()) unused(i);
     if (scene.objects[i].shapes.empty()) shown[i] = 0;
   }
+  if (std::find(shown.begin(), shown.end(), 0) == shown.end()) return {};
   std::vector<uint8_t> kept(scene.instances.size());
   for (size_t i = 0; i < kept.size(); ++i) kept[i] = shown[scene.instances[i].object];
   const std::vector<uint32_t> instance_numbers = keep_used(scene.instances, kept);

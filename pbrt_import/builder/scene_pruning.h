@@ -21,7 +21,7 @@ inline constexpr uint32_t kDropped = ~0u;
 /// Drops objects without instances, and objects without shapes together with their instances. The rest keeps its order.
 /// @param residuals by instance: rounding error of its transform, as in move_far_world(); updated with the instances
 /// @param keep_unplaced keep objects that have shapes but no instance
-/// @return by old number of an instance: its new one, or kDropped
+/// @return by old number of an instance: its new one, or kDropped; empty if nothing was dropped
 /// @param unused called with the index of each object that has shapes but no instance
 std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
                                           const std::function<void(uint32_t object)>& unused);

@@ -19,6 +19,7 @@ void TrackedMotions::add_instance(uint32_t instance, const TrackedMotion& motion
 }
 
 void TrackedMotions::renumber(std::span<const uint32_t> numbers) {
+  if (numbers.empty()) return;
   for (Instance& one : instances_) one.instance = numbers[one.instance];
   std::erase_if(instances_, [](const Instance& one) { return one.instance == kDropped; });
 }

@@ -18,7 +18,7 @@ public:
   /// @param instance index into Scene::instances, above those before
   void add_instance(uint32_t instance, const TrackedMotion& motion);
   /// After instances were dropped.
-  /// @param numbers by old number: the new one, or kDropped
+  /// @param numbers by old number: the new one, or kDropped; empty if none was dropped
   void renumber(std::span<const uint32_t> numbers);
   size_t instance_count() const { return instances_.size(); }
 

@@ -68,7 +68,8 @@ bool Parser::next(Directive& directive) {
     directive.name_count = 0;
     directive.damaged = false;
     directive.parameters.clear();
-    directive.memory = MemoryReservation(memory_);
+    directive.memory.release();
+    if (!directive.memory.has_budget()) directive.memory = MemoryReservation(memory_);
     directive_ = &directive;
     value_bytes_ = 0;
     source_.consume();
@@ -170,7 +171,7 @@ bool Parser::take_number(Values& values) {
   if (token.kind != TokenKind::kWord || !may_start_number(token.text[0])) return false;
   using Parsed = std::conditional_t<std::is_same_v<T, float>, float, double>;
   const NumberText<Parsed> number = parse_word<Parsed>(token.text);
-  if (number.used == 0 || is_directive(token)) return false;
+  if (number.used == 0 || (is_letter(token.text[0]) && is_directive(token))) return false;
   if (number.used < token.text.size())
     reporter_.warning(source_.place(),
                       "number " + describe(token) + " has other characters after it; they are ignored");
@@ -197,8 +198,14 @@ void Parser::read_number_run(Values& values) {
     count_value(numbers.size() * sizeof(typename Values::value_type));
     append(values, numbers);
   };
-  do source_.read_numbers<typename Values::value_type>(take);
-  while (take_number(values));
+  do {
+    source_.read_numbers<typename Values::value_type>(take);
+    if constexpr (!std::is_same_v<typename Values::value_type, int32_t>) // integers are checked as doubles
+      for (typename Values::value_type value; source_.read_bare_number(value);) {
+        count_value(sizeof value);
+        values.push_back(value);
+      }
+  } while (take_number(values));
 }
 
 template bool Parser::take_number(IntegerArray& values);

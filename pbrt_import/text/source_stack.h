@@ -39,6 +39,12 @@ public:
     guarded([&](Tokenizer& tokenizer) { tokenizer.read_numbers<T>(take); });
   }
 
+  /// Tokenizer::read_bare_number() of the current file. Only valid directly after consume() or read_numbers().
+  template <class T>
+  bool read_bare_number(T& value) {
+    return !gave_up_ && files_open_.back().tokenizer.read_bare_number(value);
+  }
+
   /// Continues with the start of another file. If the file cannot be included, this is reported and reading continues
   /// after the Include.
   /// @param place position of the Include directive

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "pbrt_import/text/number.h"
 #include "pbrt_import/text/text_blocks.h"
 
 namespace packtrace {
@@ -50,6 +51,11 @@ public:
   /// get a span of int32_t. Throws Error like InputFile::read.
   template <class T, class Take>
   void read_numbers(Take take);
+
+  /// Reads the next word if it is a number in the common form, far from the window's end and behind nothing but spaces
+  /// and line feeds; else reads nothing. The value is that of parse_number() for the word. T is float or double.
+  template <class T>
+  bool read_bare_number(T& value);
 
   /// Content bytes consumed so far.
   uint64_t consumed_bytes() const { return window_offset_ + position_; }
@@ -109,6 +115,25 @@ void Tokenizer::read_numbers(Take take) {
       take(part(block_->doubles));
     skip(*run);
   }
+}
+
+template <class T>
+bool Tokenizer::read_bare_number(T& value) {
+  size_t start = position_, line_end = 0;
+  uint32_t line_ends = 0;
+  for (; start < size_ && (window_[start] == ' ' || window_[start] == '\n'); ++start)
+    if (window_[start] == '\n') ++line_ends, line_end = start;
+  if (start + kScannerReach > size_) return false;
+  const char* end = nullptr;
+  if constexpr (std::is_same_v<T, float>)
+    end = scan_float(window_ + start, value);
+  else
+    end = scan_double(window_ + start, value);
+  if (!end) return false;
+  position_ = static_cast<size_t>(end - window_);
+  line_ += line_ends;
+  if (line_ends > 0) line_start_ = window_offset_ + line_end + 1;
+  return true;
 }
 
 template <class T>

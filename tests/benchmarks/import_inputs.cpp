@@ -201,6 +201,25 @@ Counts write_objects(const fs::path& folder, double scale) {
   return {count, uses};
 }
 
+/// Instances of one triangle with the shortest text: what an instance costs apart from its numbers.
+Counts write_placements(const fs::path& folder, double scale) {
+  const uint64_t count = scaled(1'000'000, scale);
+  SceneFile file(folder);
+  file.write(fmt::format("ObjectBegin \"t\"\n{}ObjectEnd\n", kTriangle));
+  write_each(file, count, [](uint32_t, auto out) { fmt::format_to(out, "Translate 1 0 0\nObjectInstance \"t\"\n"); });
+  file.end();
+  return {1, count};
+}
+
+Counts write_tiny_meshes(const fs::path& folder, double scale) {
+  const uint64_t count = scaled(600, scale);
+  constexpr Grid kGrid{5, 5};
+  SceneFile file(folder);
+  for (uint64_t i = 0; i < count; ++i) write_mesh(file, {kGrid.columns, kGrid.rows, i});
+  file.end();
+  return {count * kGrid.triangle_count(), 0};
+}
+
 Counts write_materials(const fs::path& folder, double scale) {
   const uint64_t count = scaled(5000, scale), uses = scaled(100'000, scale);
   SceneFile file(folder);
@@ -237,9 +256,9 @@ struct Recipe {
   Counts (*write)(const fs::path& folder, double scale);
 };
 constexpr std::array kRecipes{
-    Recipe{"meshes", write_meshes},     Recipe{"one-mesh", write_one_mesh}, Recipe{"instances", write_instances},
-    Recipe{"ply", write_ply_files},     Recipe{"objects", write_objects},   Recipe{"materials", write_materials},
-    Recipe{"includes", write_includes},
+    Recipe{"meshes", write_meshes},     Recipe{"one-mesh", write_one_mesh},     Recipe{"instances", write_instances},
+    Recipe{"ply", write_ply_files},     Recipe{"objects", write_objects},       Recipe{"materials", write_materials},
+    Recipe{"includes", write_includes}, Recipe{"placements", write_placements}, Recipe{"tiny", write_tiny_meshes},
 };
 constexpr auto kNames = [] {
   std::array<std::string_view, kRecipes.size()> names;

@@ -144,6 +144,39 @@ TEST(Tokenizer, LongNumberRunsAreTheSameForEveryWindow) {
   }
 }
 
+/// Tokens without their kinds. Numbers appear as their values; with `bare`, read_bare_number() reads those that it can,
+/// and their number is added.
+std::string listing_of_values(Tokenizer tokenizer, size_t* bare) {
+  std::string all;
+  while (true) {
+    for (double value = 0; bare && tokenizer.read_bare_number(value); ++*bare) all += std::to_string(value) + " ";
+    const Token token = tokenizer.next();
+    const NumberText<double> number = parse_number<double>(token.text);
+    if (token.kind == TokenKind::kWord && number.used == token.text.size())
+      all += std::to_string(number.value) + " ";
+    else
+      all.append(token.text).append("@").append(std::to_string(token.line)).append(":") += std::to_string(token.column);
+    if (token.kind == TokenKind::kEnd) return all;
+  }
+}
+
+TEST(Tokenizer, BareNumbersAreThoseOfTheirWords) {
+  const SceneFolder folder;
+  std::string text;
+  for (int i = 0; i < 40; ++i)
+    text.append(
+            "Translate 1 -2.5\n\n 3e2 word\r\n 4# 5 # 6\n +7 .5 8\t9\r10 0x 12345678901234567890 1e99 [11]12\"13\" ")
+        .append("1\0002 \n", 5);
+  const std::string expected = listing_of_values(open(folder, text), nullptr);
+  for (const size_t window : {size_t{1}, size_t{90}, size_t{300}, Tokenizer::kDefaultWindow}) {
+    size_t bare = 0;
+    EXPECT_EQ(listing_of_values(open(folder, text, window), &bare), expected) << window;
+    if (window == Tokenizer::kDefaultWindow) { // reads all but those near the end
+      EXPECT_GE(bare, 39u * 6u);
+    }
+  }
+}
+
 TEST(Number, RandomFloatsAreRoundedLikeFromChars) {
   std::mt19937_64 random(7);
   char buffer[64];

@@ -1,8 +1,15 @@
 #include "pbrt_import/scene/math.h"
 
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <limits>
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "pbrt_import/scene/bounds.h"
+#include "pbrt_import/scene/flattening.h"
 
 namespace packtrace {
 namespace {
@@ -76,6 +83,55 @@ TEST(Bounds, EmptyStaysEmptyUnderTransforms) {
   EXPECT_TRUE(empty.empty());
   EXPECT_TRUE(transform_bounds(kSkew, empty).empty());
   EXPECT_EQ(empty.diagonal(), 0.0);
+}
+
+/// Components of maps and boxes, among them zeros and infinities.
+double random_component(std::mt19937& random) {
+  constexpr double kSpecial[] = {0.0, -0.0, 1.0, -1.0, 1e300, -1e300, std::numeric_limits<double>::infinity()};
+  const size_t choice = random() % 20;
+  return choice < std::size(kSpecial) ? kSpecial[choice] : std::uniform_real_distribution<double>(-100, 100)(random);
+}
+
+DAffine random_map(std::mt19937& random) {
+  DAffine map;
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 3; ++row) map[column][row] = random_component(random);
+  return map;
+}
+
+TEST(Bounds, TransformedBoxIsThatOfTheEightCornersBitByBit) {
+  std::mt19937 random(1);
+  for (int i = 0; i < 20000; ++i) {
+    const DAffine map = random_map(random);
+    const DVec3 a(random_component(random), random_component(random), random_component(random));
+    const DVec3 b(random_component(random), random_component(random), random_component(random));
+    const Bounds box{glm::min(a, b), glm::max(a, b)};
+    Bounds corners;
+    for (int corner = 0; corner < 8; ++corner)
+      corners.extend(transform_point(map, DVec3(corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y,
+                                                corner & 4 ? box.hi.z : box.lo.z)));
+    const Bounds found = transform_bounds(map, box);
+    ASSERT_EQ(std::memcmp(&found, &corners, sizeof found), 0) << i;
+  }
+}
+
+TEST(Flattens, AgreesWithTheConditionNumber) {
+  std::mt19937 random(2);
+  const auto norm = [](const glm::dmat3& m) {
+    return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+  };
+  int flat = 0;
+  for (int i = 0; i < 20000; ++i) {
+    DAffine map = random_map(random);
+    const double scale = std::ldexp(1.0, static_cast<int>(random() % 60) - 30);
+    for (int row = 0; row < 3; ++row) map[0][row] = map[1][row] * 0.7 + map[2][row] * 0.2 + map[0][row] * scale;
+    const glm::dmat3 linear(map), unit = linear / norm(linear);
+    const bool expected = !(norm(unit) * norm(glm::inverse(unit)) < 0x1p22);
+    ASSERT_EQ(flattens(map), expected) << i;
+    flat += expected;
+  }
+  EXPECT_GT(flat, 2000);
+  EXPECT_LT(flat, 18000);
 }
 
 TEST(Bounds, TransformedBoxHoldsTransformedPoints) {
