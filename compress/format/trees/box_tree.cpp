@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -18,6 +19,40 @@ TreeBox empty_box() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   return {{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
 }
+
+using Float4 = float __attribute__((vector_size(16)));
+using Double4 = double __attribute__((vector_size(32)));
+using Int4 = int32_t __attribute__((vector_size(16)));
+
+/// A TreeBox in two overlapping vectors of its six floats, which extend without a loop over the axes.
+struct BoxLanes {
+  Float4 front; ///< low ends, then the first high end, which is not used
+  Float4 back;  ///< the last low end, which is not used, then high ends
+
+  BoxLanes() = default; // undefined, because most bins of short runs are never used
+  explicit BoxLanes(const TreeBox& box) {
+    static_assert(sizeof(TreeBox) == 24);
+    const auto* const floats = reinterpret_cast<const char*>(&box);
+    std::memcpy(&front, floats, sizeof front);
+    std::memcpy(&back, floats + sizeof box - sizeof back, sizeof back);
+  }
+  void extend(const BoxLanes& other) {
+    front = other.front < front ? other.front : front;
+    back = other.back > back ? other.back : back;
+  }
+  TreeBox box() const {
+    float floats[8];
+    std::memcpy(floats, &front, sizeof front);
+    std::memcpy(floats + 4, &back, sizeof back);
+    return {{floats[0], floats[1], floats[2]}, {floats[5], floats[6], floats[7]}};
+  }
+  /// The centre along each axis, rounded to floats; the fourth lane is not used.
+  Float4 centre() const {
+    const Float4 high = __builtin_shufflevector(back, back, 1, 2, 3, 3);
+    return __builtin_convertvector(
+        (__builtin_convertvector(front, Double4) + __builtin_convertvector(high, Double4)) * 0.5, Float4);
+  }
+};
 
 /// Twice the centre of a box along an axis.
 double centre(const TreeBox& box, size_t axis) { return double{box.lo[axis]} + box.hi[axis]; }
@@ -47,16 +82,20 @@ public:
 
   /// Returns the bounds of the boxes' centres. `whole` receives the bounds of the boxes.
   TreeBox measure(std::span<const uint32_t> order, TreeBox& whole) const {
-    whole = empty_box();
-    TreeBox centres = empty_box();
+    BoxLanes all(empty_box());
+    constexpr float kInf = std::numeric_limits<float>::infinity();
+    Float4 lowest{kInf, kInf, kInf, kInf}, highest = -lowest;
     for (const uint32_t i : order) {
-      const TreeBox& box = boxes_[i];
-      whole.extend(box);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const auto place = static_cast<float>(0.5 * centre(box, axis));
-        centres.lo[axis] = std::min(centres.lo[axis], place), centres.hi[axis] = std::max(centres.hi[axis], place);
-      }
+      const BoxLanes box(boxes_[i]);
+      all.extend(box);
+      const Float4 place = box.centre();
+      lowest = place < lowest ? place : lowest;
+      highest = place > highest ? place : highest;
     }
+    whole = all.box();
+    TreeBox centres;
+    std::memcpy(centres.lo.data(), &lowest, sizeof centres.lo);
+    std::memcpy(centres.hi.data(), &highest, sizeof centres.hi);
     return centres;
   }
 
@@ -74,9 +113,7 @@ public:
         const double extent = 2.0 * (double{centres.hi[axis]} - centres.lo[axis]);
         axes[axis].scale = extent > 0.0 ? axes[axis].bins / extent : 0.0;
       }
-      Split best;
-      for (size_t axis = 0; axis < 3; ++axis)
-        if (axes[axis].scale > 0.0) find_split(order, axes[axis], axis, best);
+      const Split best = find_split(order, axes);
       if (best.bin > 0) {
         const auto middle = std::partition(order.begin(), order.end(), [&](uint32_t i) {
           return axes[best.axis](rounded_centre(boxes_[i], best.axis)) < best.bin;
@@ -93,27 +130,51 @@ private:
     return 2.0 * double{static_cast<float>(0.5 * centre(box, axis))};
   }
 
-  void find_split(std::span<const uint32_t> order, const BinAxis& bins, size_t axis, Split& best) const {
-    std::array<TreeBox, kMaxBins> boxes;
+  /// Boxes of one axis by their bins.
+  struct Bins {
+    std::array<BoxLanes, kMaxBins> boxes;
     std::array<uint32_t, kMaxBins> counts;
-    std::fill_n(counts.begin(), bins.bins, 0u);
-    for (uint32_t b = 0; b < bins.bins; ++b) boxes[b] = empty_box();
+  };
+
+  Split find_split(std::span<const uint32_t> order, const std::array<BinAxis, 3>& axes) const {
+    std::array<Bins, 3> bins;
+    const BoxLanes empty(empty_box());
+    for (size_t axis = 0; axis < 3; ++axis) {
+      std::fill_n(bins[axis].boxes.begin(), axes[axis].bins, empty);
+      std::fill_n(bins[axis].counts.begin(), axes[axis].bins, 0u);
+    }
+    const Double4 low{axes[0].low, axes[1].low, axes[2].low}, scale{axes[0].scale, axes[1].scale, axes[2].scale};
     for (const uint32_t i : order) {
-      const uint32_t b = bins(rounded_centre(boxes_[i], axis));
-      boxes[b].extend(boxes_[i]);
-      ++counts[b];
+      const BoxLanes box(boxes_[i]);
+      const Double4 place = __builtin_convertvector(box.centre(), Double4) * 2.0;
+      const Int4 number = __builtin_convertvector((place - low) * scale, Int4); // as BinAxis computes it
+      std::array<int32_t, 4> numbers;
+      std::memcpy(numbers.data(), &number, sizeof number);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const uint32_t b = std::min(static_cast<uint32_t>(numbers[axis]), axes[axis].bins - 1);
+        bins[axis].boxes[b].extend(box);
+        ++bins[axis].counts[b];
+      }
     }
+    Split best;
+    for (size_t axis = 0; axis < 3; ++axis)
+      if (axes[axis].scale > 0.0) sweep(bins[axis], axes[axis].bins, axis, best);
+    return best;
+  }
+
+  /// Lowers `best` by the splits between bins of an axis.
+  void sweep(const Bins& bins, uint32_t count, size_t axis, Split& best) const {
     std::array<double, kMaxBins> right_cost; // of bins b and above, for b > 0
-    TreeBox box = empty_box();
-    for (uint32_t b = bins.bins, n = 0; b-- > 1;) {
-      if (counts[b] > 0) box.extend(boxes[b]), n += counts[b];
-      right_cost[b] = n > 0 ? box.half_area() * units(n) : -1.0;
+    BoxLanes box(empty_box());
+    for (uint32_t b = count, n = 0; b-- > 1;) {
+      if (bins.counts[b] > 0) box.extend(bins.boxes[b]), n += bins.counts[b];
+      right_cost[b] = n > 0 ? box.box().half_area() * units(n) : -1.0;
     }
-    box = empty_box();
-    for (uint32_t b = 1, n = 0; b < bins.bins; ++b) {
-      if (counts[b - 1] > 0) box.extend(boxes[b - 1]), n += counts[b - 1];
+    box = BoxLanes(empty_box());
+    for (uint32_t b = 1, n = 0; b < count; ++b) {
+      if (bins.counts[b - 1] > 0) box.extend(bins.boxes[b - 1]), n += bins.counts[b - 1];
       if (n == 0 || right_cost[b] < 0.0) continue;
-      const double cost = box.half_area() * units(n) + right_cost[b];
+      const double cost = box.box().half_area() * units(n) + right_cost[b];
       if (cost < best.cost) best = {cost, axis, b};
     }
   }
