@@ -110,6 +110,7 @@ template <bool kAligned>
 /// Half a block of rays, rounded to floats.
 struct GridFloats {
   HalfFloats origin[3], direction[3], begin, end;
+  HalfFloats rest[3]; ///< RayGroup::rest; set for nearest hits only
 };
 
 /// Rounds rays in the grid to floats.
@@ -120,6 +121,7 @@ template <bool kNearest>
   for (uint32_t axis = 0; axis < 3; ++axis) {
     out.origin[axis] = to_floats(rays.origin[axis]);
     out.direction[axis] = to_floats(rays.direction[axis]);
+    if constexpr (kNearest) out.rest[axis] = to_floats(rays.origin[axis] - to_doubles(out.origin[axis]));
   }
   out.begin = to_floats(read_doubles(&from.tnear[first]) * rays.power - rays.begin);
   const Doubles end = read_doubles(&from.tmax[first]) * rays.power;
@@ -130,11 +132,14 @@ template <bool kNearest>
   return out;
 }
 
+/// @tparam kRest whether `rest` is set
+template <bool kRest>
 inline RayBlock join(const GridFloats& low, const GridFloats& high) {
   RayBlock out;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     out.origin[axis] = join(low.origin[axis], high.origin[axis]);
     out.direction[axis] = join(low.direction[axis], high.direction[axis]);
+    if constexpr (kRest) out.rest[axis] = join(low.rest[axis], high.rest[axis]);
   }
   out.begin = join(low.begin, high.begin);
   out.end = join(low.end, high.end);
@@ -152,9 +157,6 @@ inline uint32_t move_block(const TracePlacement& placement, float max_coordinate
     GridRays rays;
     usable |= move_rays<kAligned>(placement, max_coordinate, from, first + at, wanted >> at, rays) << at;
     const GridFloats rounded = to_floats<kNearest>(rays, from, first + at);
-    if constexpr (kNearest && Group::kTriangles)
-      for (uint32_t axis = 0; axis < 3; ++axis)
-        write_block(&group.rest[axis][first + at], to_floats(rays.origin[axis] - to_doubles(rounded.origin[axis])));
     if constexpr (kNearest) {
       write_block(&group.t_begin[first + at], rays.begin);
       write_block(&group.t_scale[first + at], rays.scale);
@@ -162,7 +164,8 @@ inline uint32_t move_block(const TracePlacement& placement, float max_coordinate
     return rounded;
   };
   const GridFloats low = half(0), high = half(kDoubleLanes);
-  out = join(low, high);
+  constexpr bool kRest = kNearest && Group::kTriangles;
+  out = join<kRest>(low, high);
   return usable & wanted;
 }
 

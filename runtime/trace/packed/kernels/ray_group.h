@@ -168,6 +168,7 @@ inline bool start_at_one_place(const UnitRays& rays, uint32_t count) {
 /// A block of rays in a tree's grid, the input of set_boxes() and set_shears().
 struct RayBlock {
   Floats origin[3], direction[3], begin, end;
+  Floats rest[3]; ///< RayGroup::rest; set for nearest hits and triangle tests only
 };
 
 /// Writes the data for box tests of a block, starting at element `first` of the group.
@@ -199,7 +200,7 @@ template <typename Group>
 }
 
 /// Writes the data for triangle tests of a block, starting at element `first` of the group.
-/// @tparam kNearest whether group.rest is set and is to be copied to group.rests
+/// @tparam kNearest whether block.rest is set
 template <bool kNearest>
 inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.origin[axis][first], block.origin[axis]);
@@ -228,9 +229,9 @@ inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   transpose(rows);
   write_rows(rows, &group.tests[first]);
   if constexpr (kNearest) {
-    Floats rest[3], rests[8]{};
-    for (uint32_t axis = 0; axis < 3; ++axis) read_block(rest[axis], &group.rest[axis][first]);
-    along_k(rest, rests);
+    Floats rests[8]{};
+    for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.rest[axis][first], block.rest[axis]);
+    along_k(block.rest, rests);
     transpose(rests);
     write_rows(rests, &group.rests[first]);
   }
