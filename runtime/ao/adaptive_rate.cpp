@@ -56,22 +56,15 @@ void AdaptiveRate::follow_surfaces(const GBuffer& g) {
   std::swap(age_, next_age_);
 }
 
-/// Returns the rate of old pixels that the budget leaves, in units of spp, and lowers the rates of young ones if it
-/// leaves too little.
-double AdaptiveRate::old_rate(const GBuffer& g, std::array<double, 3>& young) const {
-  std::array<uint64_t, 4> pixels{};
+/// Returns rates that keep the budget of one unit per pixel: less for young pixels if old ones would get too little.
+AdaptiveRate::Rates AdaptiveRate::rates(const GBuffer& g) const {
+  uint64_t young_pixels = 0, old_pixels = 0;
   for (size_t i = 0; i < age_.size(); ++i)
-    if (g.instance[i] != kNoInstance)
-      ++pixels[static_cast<size_t>(std::ranges::count_if(kAges, [&](uint8_t age) { return age_[i] >= age; }))];
-  double all = 0.0;
-  for (const uint64_t count : pixels) all += static_cast<double>(count);
-  const auto old = static_cast<double>(pixels[3]);
-  for (;;) {
-    double left = all;
-    for (size_t c = 0; c < young.size(); ++c) left -= young[c] * static_cast<double>(pixels[c]);
-    if (left >= kMinRate * old) return old > 0.0 ? std::min(1.0, left / old) : 1.0;
-    for (double& rate : young) rate = std::max(1.0, rate - 0.5);
-  }
+    if (g.instance[i] != kNoInstance) ++(age_[i] < kYoungFrames ? young_pixels : old_pixels);
+  const auto young = static_cast<double>(young_pixels), old = static_cast<double>(old_pixels);
+  if (old == 0.0 || young == 0.0) return {1.0, 1.0};
+  const double young_rate = std::min(kYoungRate, (young + old - kMinRate * old) / young);
+  return {young_rate, (young + old - young_rate * young) / old};
 }
 
 SamplePlan AdaptiveRate::next_frame(const GBuffer& g, bool same_pixels, uint32_t spp,
@@ -82,16 +75,13 @@ SamplePlan AdaptiveRate::next_frame(const GBuffer& g, bool same_pixels, uint32_t
     follow_surfaces(g);
   for (size_t i = 0; i < max_history.size(); ++i)
     if (max_history[i] < static_cast<float>(age_[i])) age_[i] = static_cast<uint8_t>(max_history[i]);
-  std::array<double, 3> young{};
-  std::ranges::copy(kMaxRates, young.begin());
-  const double old = old_rate(g, young);
+  const Rates rates = this->rates(g);
   for_pixels(size_.pixels(), [&](size_t i) {
     Pixel& pixel = pixels_[i];
     first_[i] = pixel.samples, count_[i] = 0;
     pixel.instance = g.instance[i], pixel.view_z = g.view_z[i];
     if (pixel.instance == kNoInstance) return;
-    const auto age_class = static_cast<size_t>(std::ranges::count_if(kAges, [&](uint8_t a) { return age_[i] >= a; }));
-    const double rate = age_class < young.size() ? young[age_class] : old;
+    const double rate = age_[i] < kYoungFrames ? rates.young : rates.old;
     const float dither =
         threshold(static_cast<uint32_t>(i % size_.width), static_cast<uint32_t>(i / size_.width), frame_);
     count_[i] = static_cast<uint16_t>(std::min(65535.0, std::floor(rate * spp + double{dither})));

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -11,16 +10,17 @@
 
 namespace packtrace {
 
-/// Gives more samples to pixels whose surfaces came into view or whose occlusion changed lately, and fewer to the
-/// others, so that a frame has as
-/// many rays as with the same number of samples for all pixels. The history of a pixel is that of the nearest pixel of
-/// the previous frame that shows the same instance at the depth where the surface was.
+/// Gives twice as many samples to pixels whose surfaces came into view or whose occlusion changed lately, and fewer to
+/// the others, so that a frame has as many rays as with the same number of samples for all pixels. The history of a
+/// pixel is that of the nearest pixel of the previous frame that shows the same instance at the depth where the surface
+/// was.
 class AdaptiveRate {
 public:
-  /// Histories of fewer than 2, 4 and 8 frames get up to 8, 4 and 2 times as many samples; older ones a mean of at
-  /// least a quarter.
-  static constexpr std::array<uint8_t, 3> kAges{2, 4, 8}, kMaxRates{8, 4, 2};
-  static constexpr double kMinRate = 0.25;
+  /// Pixels with a history of fewer frames are young.
+  static constexpr uint8_t kYoungFrames = 2;
+  /// Samples of young pixels, and the smallest mean of the others, relative to `spp`. Old pixels need their samples
+  /// nearly as much: with 4 or 8 times as many for young ones, moving pictures err more than with a uniform rate.
+  static constexpr double kYoungRate = 2.0, kMinRate = 0.25;
 
   /// Forgets all frames.
   void clear() { age_.clear(); }
@@ -50,7 +50,10 @@ private:
   };
   void resize(ImageSize size);
   void follow_surfaces(const GBuffer& gbuffer);
-  double old_rate(const GBuffer& gbuffer, std::array<double, 3>& young) const;
+  struct Rates {
+    double young, old; ///< in units of spp
+  };
+  Rates rates(const GBuffer& gbuffer) const;
 
   ImageSize size_;
   uint32_t frame_ = 0;

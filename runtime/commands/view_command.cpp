@@ -27,6 +27,8 @@ namespace {
 constexpr uint64_t kMaxScriptBytes = uint64_t{1} << 26;
 constexpr ImageSize kWindow{960, 540}; ///< default of --size
 
+bool opens_window(const ViewOptions& options) { return !options.script && !options.profile; }
+
 ImageSize view_size(const ViewOptions& options) {
   return options.render.size.empty() ? kWindow : parse_size(options.render.size);
 }
@@ -40,7 +42,7 @@ std::unique_ptr<ViewSession> make_session(const ViewOptions& options, const Glob
   config.frame = frame_config(options.render, detail);
   config.frame.size = config.size;
   config.frame.validate();
-  config.target_ms = options.target_ms.value_or(0.0);
+  config.target_ms = options.target_ms.value_or(opens_window(options) ? kWindowTargetMs : 0.0);
   config.memory = globals.memory;
   std::vector<ViewFile> files;
   for (const std::string& name : options.files)
@@ -122,7 +124,7 @@ int run_viewer(const ViewOptions& options, const GlobalOptions& globals) {
   JsonOutput json(globals.json, globals.force);
   ViewOutputs outputs(globals);
   nlohmann::json result = {{"verb", "view"}, {"inputs", options.files}};
-  const bool window = !options.script && !options.profile;
+  const bool window = opens_window(options);
   if (window) {
     show_in_window(
         view_size(options),

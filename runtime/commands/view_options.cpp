@@ -39,8 +39,9 @@ void add_viewer_options(CLI::App& verb, ViewOptions& options) {
       ->required();
   add_view_options(verb, options.render);
   verb.add_option("--target-ms", options.target_ms,
-                  "Milliseconds that a frame may take while something moves: above, its resolution falls, and then "
-                  "the number of its rays. 0 keeps the quality (default 0)")
+                  fmt::format("Milliseconds that a frame may take while something moves: above, its resolution falls, "
+                              "and then the number of its rays. 0 keeps the quality (default {} in a window, else 0)",
+                              kWindowTargetMs))
       ->type_name("MS");
   verb.add_option("--settings", options.settings,
                   "Start with the views, settings and camera of a .toml file that the window saved")

@@ -10,11 +10,14 @@
 
 namespace packtrace {
 
+/// A window's frames while something moves, unless --target-ms says otherwise: 30 per second.
+inline constexpr double kWindowTargetMs = 33.0;
+
 /// The options of `view`.
 struct ViewOptions {
   std::vector<std::string> files;
-  RenderOptions render; ///< those that `render` has too
-  std::optional<double> target_ms;
+  RenderOptions render;              ///< those that `render` has too
+  std::optional<double> target_ms;   ///< unless set, kWindowTargetMs for a window, else 0
   std::optional<std::string> script; ///< of --headless
   std::optional<uint32_t> profile;   ///< frames
   std::optional<std::string> csv;

@@ -28,14 +28,26 @@ FrameConfig at_quality_step(const FrameConfig& config, uint32_t step) {
   return cheaper;
 }
 
+uint32_t QualityControl::step_down(double frame_ms) const {
+  uint32_t step = step_;
+  do ++step;
+  while (step < kSmallestStep && frame_ms * pixel_fraction(step) / pixel_fraction(step_) > kSlow * target_ms_);
+  return step;
+}
+
+void QualityControl::start(double still_ms) {
+  if (target_ms_ <= 0.0 || has_moved_) return;
+  step_ = 0;
+  if (still_ms > kSlow * target_ms_) step_ = step_down(still_ms);
+}
+
 void QualityControl::add(double frame_ms) {
   if (target_ms_ <= 0.0) return;
+  has_moved_ = true;
   slow_ = frame_ms > kSlow * target_ms_ ? slow_ + 1 : 0;
   fast_ = frame_ms < kFast * target_ms_ ? fast_ + 1 : 0;
   if (slow_ >= kSlowFrames && step_ < kCheapestStep) {
-    const double pixels = pixel_fraction(step_);
-    do ++step_;
-    while (step_ < kSmallestStep && frame_ms * pixel_fraction(step_) / pixels > kSlow * target_ms_);
+    step_ = step_down(frame_ms);
     slow_ = 0;
   } else if (fast_ >= kFastFrames && step_ > 0) {
     --step_;

@@ -23,11 +23,18 @@ public:
 
   uint32_t step() const { return step_; }
   double target_ms() const { return target_ms_; }
+  /// Chooses the step of the first moving frame by the time of a still frame with camera rays at step 0. Has no effect
+  /// after add().
+  void start(double still_ms);
   /// Adds the time of a moving frame at step().
   void add(double frame_ms);
 
 private:
+  /// The next step below step(), at which a frame took this long, whose resolution should meet the target.
+  uint32_t step_down(double frame_ms) const;
+
   double target_ms_;
+  bool has_moved_ = false;                  ///< add() was called
   uint32_t step_ = 0, slow_ = 0, fast_ = 0; ///< consecutive frames above and below the target
 };
 

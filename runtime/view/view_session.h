@@ -142,9 +142,12 @@ public:
   const ViewFrame& last() const { return last_; }
   /// Whether the next frame restarts the image, because something moved or changed since the last one.
   bool changed() const { return moved_ || restart_ || changed_; }
-  /// Reports how long the last moving frame took, for QualityControl.
+  /// Reports how long the last frame took, for QualityControl.
   void add_frame_time(double ms) {
-    if (last_.moving) quality_.add(ms);
+    if (last_.moving)
+      quality_.add(ms);
+    else if (last_.still_frames == 1)
+      quality_.start(ms);
   }
 
   // The result of the frames so far; needs a step() before.

@@ -148,15 +148,15 @@ TEST(AdaptiveRate, NewSurfacesGetMoreSamplesOfTheSameBudget) {
   AdaptiveRate rate;
   for (int frame = 0; frame < 20; ++frame) {
     const SamplePlan plan = rate.next_frame(moved_plane(0), false, 1);
-    EXPECT_NEAR(static_cast<double>(sum_of(plan)), 64 * 32, frame < 8 ? 300 : 0) << frame;
+    EXPECT_NEAR(static_cast<double>(sum_of(plan)), 64 * 32, 0) << frame;
   }
   // 4 columns come into view at the left.
   const SamplePlan plan = rate.next_frame(moved_plane(4), false, 1);
   EXPECT_LE(sum_of(plan), 64u * 32u * 102 / 100);
   uint64_t young = 0, old = 0;
   for (size_t i = 0; i < 64 * 32; ++i) (i % 64 < 4 ? young : old) += plan.pixel_count[i];
-  EXPECT_EQ(young, 8u * 4 * 32);
-  EXPECT_GT(old, 60u * 32 / 2);
+  EXPECT_EQ(young, 2u * 4 * 32);
+  EXPECT_GT(old, 60u * 32 * 9 / 10);
 }
 
 TEST(AdaptiveRate, EveryPixelGetsASampleWithinFourFrames) {
@@ -176,7 +176,7 @@ TEST(AdaptiveRate, ForgetsSurfacesOfAnotherDepthOrInstance) {
   GBuffer other = moved_plane(0);
   other.view_z[100] = 6.0f, other.instance[200] = 1;
   const SamplePlan plan = rate.next_frame(other, false, 1);
-  for (const size_t i : {100u, 200u}) EXPECT_EQ(plan.pixel_count[i], 8u);
+  for (const size_t i : {100u, 200u}) EXPECT_EQ(plan.pixel_count[i], 2u);
   EXPECT_EQ(rate.ages()[100], 1u);
   EXPECT_EQ(rate.ages()[101], 13u);
 }
@@ -185,11 +185,12 @@ TEST(AdaptiveRate, SurfacesWhoseOcclusionChangesGetMoreSamples) {
   AdaptiveRate rate;
   for (int frame = 0; frame < 12; ++frame) rate.next_frame(moved_plane(0), false, 1);
   std::vector<float> limits(64 * 32, 1e30f);
-  limits[100] = 0.3f, limits[200] = 3.9f;
+  limits[100] = 0.3f, limits[200] = 3.9f, limits[300] = 1.9f;
   const SamplePlan plan = rate.next_frame(moved_plane(0), false, 1, limits);
-  EXPECT_EQ(plan.pixel_count[100], 8u);
-  EXPECT_EQ(plan.pixel_count[200], 4u);
-  EXPECT_EQ(rate.ages()[200], 4u);
+  EXPECT_EQ(plan.pixel_count[100], 2u);
+  EXPECT_EQ(plan.pixel_count[300], 2u);
+  EXPECT_LE(plan.pixel_count[200], 1u);
+  EXPECT_GE(rate.ages()[200], 3u);
   EXPECT_EQ(rate.ages()[101], 13u);
 }
 

@@ -47,6 +47,22 @@ TEST(QualityControl, ReachesTheTargetWhereItCan) {
   }
 }
 
+TEST(QualityControl, AStillFrameChoosesTheFirstStep) {
+  QualityControl control(33);
+  control.start(20);
+  EXPECT_EQ(control.step(), 0u);
+  control.start(90);
+  const uint32_t step = control.step();
+  EXPECT_LE(frame_ms(90, step), 33 * 1.1);
+  EXPECT_GT(frame_ms(90, step - 1), 33 * 1.1);
+  control.add(frame_ms(90, step));
+  control.start(1000);
+  EXPECT_EQ(control.step(), step) << "moving frames know better";
+  QualityControl unlimited(0);
+  unlimited.start(1000);
+  EXPECT_EQ(unlimited.step(), 0u);
+}
+
 TEST(QualityControl, OneSlowFrameChangesNothing) {
   QualityControl control(33);
   for (int i = 0; i < 50; ++i) control.add(i % 2 == 0 ? 80 : 30);
