@@ -2,53 +2,19 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "runtime/ao/surface_similarity.h"
+#include "runtime/simd.h"
+
 namespace packtrace {
 namespace {
 
-constexpr double kMaxSlope = 0.3;      ///< sine of the angle between line and surface from which the weight is 0
-constexpr float kNormalSlack = 1.1f;   ///< normals up to acos(1 / 1.1) = 25 degrees apart count as equal
-constexpr int kNormalSquarings = 6;    ///< cosine to the power of 64
-constexpr float kMinWeight = 0.1f;     ///< smallest total weight with which a mean is used
-constexpr float kMinWeightFar = 0.01f; ///< the same for the 5 x 5 nearest blocks
-constexpr float kSimilar = 0.99f;      ///< similarity at which the search for a more similar block stops
-constexpr float kMuchLower = 0.25f;    ///< difference of similarity from which another pixel of a block is chosen
-
-/// How two surface points relate.
-struct Relation {
-  float cosine; ///< between the shading normals
-  float slope2; ///< squared sine of the angle between their line and the surfaces, the larger one
-};
-
-Relation relate(const GBuffer& g, size_t a, size_t b) {
-  const DVec3 line = DVec3(g.position[b]) - DVec3(g.position[a]);
-  const double length2 = glm::dot(line, line);
-  const double height = std::max(std::abs(glm::dot(DVec3(g.geometric_normal[a]), line)),
-                                 std::abs(glm::dot(DVec3(g.geometric_normal[b]), line)));
-  const double slope2 = length2 > 0.0 ? height * height / length2 : 0.0;
-  return {glm::dot(g.normal[a], g.normal[b]), static_cast<float>(slope2)};
-}
-
-/// 1 for points of one plane, 0 for points of different surfaces.
-float similarity(Relation r) {
-  float aligned = std::min(1.0f, kNormalSlack * r.cosine);
-  const float flat = 1.0f - r.slope2 / static_cast<float>(kMaxSlope * kMaxSlope);
-  if (!(aligned > 0.0f) || !(flat > 0.0f)) return 0.0f; // also for NaN
-  for (int i = 0; i < kNormalSquarings; ++i) aligned *= aligned;
-  return aligned * flat * flat;
-}
-
-float similarity(const GBuffer& g, size_t a, size_t b) {
-  if (!(glm::dot(g.normal[a], g.normal[b]) > 0.0f)) return 0.0f; // spares reading positions
-  return similarity(relate(g, a, b));
-}
-
-bool is_hit(const GBuffer& g, size_t pixel) { return g.instance[pixel] != kNoInstance; }
+constexpr float kSimilar = 0.99f; ///< similarity at which the search for a more similar block stops
+constexpr uint32_t kBlockRows = 8;
+constexpr float kMuchLower = 0.25f; ///< difference of similarity from which another pixel of a block is chosen
 
 constexpr std::array<std::array<uint32_t, 2>, 4> kOffsets{{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}; ///< diagonal first
 
@@ -65,23 +31,9 @@ struct Block {
 
 template <class Body>
 void for_each_row(uint32_t rows, const Body& body) {
-  tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rows, 8), [&](const tbb::blocked_range<uint32_t>& range) {
+  tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rows, kBlockRows), [&](const tbb::blocked_range<uint32_t>& range) {
     for (uint32_t y = range.begin(); y != range.end(); ++y) body(y);
   });
-}
-
-/// Calls body(index, column, row) for the blocks of some columns and rows, bounds included, that lie in the picture.
-template <class Body>
-void for_blocks(ImageSize half, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1, const Body& body) {
-  x1 = std::min(half.width - 1, x1), y1 = std::min(half.height - 1, y1);
-  for (uint32_t y = y0; y <= y1; ++y)
-    for (uint32_t x = x0; x <= x1; ++x) body(size_t{y} * half.width + x, x, y);
-}
-
-/// Calls body(index, column, row) for the blocks within `reach` of a block, itself included.
-template <class Body>
-void for_neighbours(ImageSize half, uint32_t bx, uint32_t by, uint32_t reach, const Body& body) {
-  for_blocks(half, bx > reach ? bx - reach : 0, by > reach ? by - reach : 0, bx + reach, by + reach, body);
 }
 
 /// The first pixel that shows a surface, per block.
@@ -98,29 +50,113 @@ std::vector<uint32_t> first_hits(const GBuffer& full, ImageSize half) {
   return pixel;
 }
 
-/// The pixel of a block that is least similar to the first hits of the neighbouring blocks.
-uint32_t least_similar(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& first, uint32_t bx,
-                       uint32_t by) {
-  const size_t own = size_t{by} * half.width + bx;
-  const auto best_similarity = [&](uint32_t p) {
-    float best = 0.0f;
-    for_neighbours(half, bx, by, 1, [&](size_t other, uint32_t, uint32_t) {
-      if (other != own && best < kSimilar && is_hit(full, first[other]))
-        best = std::max(best, similarity(full, p, first[other]));
-    });
-    return best;
-  };
-  uint32_t chosen = first[own];
-  if (!is_hit(full, chosen)) return chosen;
-  float least = best_similarity(chosen) - kMuchLower;
-  const Block block(full.size, bx, by);
-  for (uint32_t i = 0; i < block.count && least > 0.0f; ++i) {
-    const uint32_t p = block.pixels[i];
-    if (p == first[own] || !is_hit(full, p)) continue;
-    if (const float value = best_similarity(p); value < least) least = value, chosen = p;
+/// Raises similarities of pixels to those with one pixel each. Returns how many are still below kSimilar.
+/// @param shown 1 if the other pixel shows a surface, else 0
+PACKTRACE_AVX2_CLONES
+uint32_t raise_similarities(uint32_t count, const PointColumns::Reader& pixels, size_t first,
+                            const PointColumns::Reader& others, const float* shown, size_t first_other, float* best) {
+  const PointColumns::Reader pixel = pixels, other = others; // local copies, which the stores below cannot change
+  uint32_t open = 0;
+#pragma GCC ivdep
+  for (uint32_t k = 0; k < count; ++k) {
+    const size_t at = first_other + k;
+    best[k] = larger(best[k], shown[at] * similarity(relate(pixel.at(first + k), other.at(at))));
+    open += best[k] < kSimilar ? 1 : 0;
   }
-  return chosen;
+  return open;
 }
+
+/// Chooses the pixels of rows of blocks.
+class PixelChooser {
+public:
+  PixelChooser(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& first)
+      : full_(full), half_(half), first_(first) {}
+
+  /// Writes the pixel of each block of a row that is least similar to the first hits of the neighbouring blocks.
+  void choose(uint32_t by, uint32_t* chosen) {
+    const std::array<const FirstRow*, 3> near{&row(by), &row(by + 1), &row(by + 2)};
+    best_.resize(half_.width), least_.resize(half_.width);
+    const uint32_t* const first = &first_[size_t{by} * half_.width];
+    std::copy_n(first, half_.width, chosen);
+    compare(near, near[1]->points, 1, [&](uint32_t bx) { return is_hit(full_, first[bx]); });
+    for (uint32_t bx = 0; bx < half_.width; ++bx) least_[bx] = is_hit(full_, first[bx]) ? best_[bx] - kMuchLower : 0.0f;
+    pixels_.resize(half_.width), others_.resize(half_.width);
+    for (const auto& [x, y] : kOffsets) {
+      bool any = false;
+      for (uint32_t bx = 0; bx < half_.width; ++bx) {
+        const uint32_t column = 2 * bx + x, pixel = (2 * by + y) * full_.size.width + column;
+        const bool inside = column < full_.size.width && 2 * by + y < full_.size.height;
+        const bool competes = inside && least_[bx] > 0.0f && pixel != first[bx] && is_hit(full_, pixel);
+        others_[bx] = competes ? pixel : kNoPixel;
+        if (competes) pixels_.set(bx, surface_point(full_, pixel));
+        any = any || competes;
+      }
+      if (!any) continue;
+      compare(near, pixels_, 0, [&](uint32_t bx) { return others_[bx] != kNoPixel; });
+      for (uint32_t bx = 0; bx < half_.width; ++bx)
+        if (best_[bx] < least_[bx]) least_[bx] = best_[bx], chosen[bx] = others_[bx];
+    }
+  }
+
+private:
+  /// The first hits of a row of blocks. Block b has index b + 1, between two that show nothing.
+  struct FirstRow {
+    PointColumns points;
+    std::vector<float> shown; ///< 1 or 0
+  };
+
+  /// The row with a number, counted from 1; none shows anything in rows outside the picture.
+  const FirstRow& row(uint32_t number) {
+    const size_t slot = number % rows_.size();
+    FirstRow& row = rows_[slot];
+    if (loaded_[slot] == number) return row;
+    loaded_[slot] = number;
+    row.points.resize(half_.width + 2), row.shown.assign(half_.width + 2, 0.0f);
+    if (number == 0 || number > half_.height) return row;
+    for (uint32_t bx = 0; bx < half_.width; ++bx) {
+      const uint32_t pixel = first_[size_t{number - 1} * half_.width + bx];
+      row.points.set(bx + 1, surface_point(full_, pixel));
+      row.shown[bx + 1] = is_hit(full_, pixel) ? 1.0f : 0.0f;
+    }
+    return row;
+  }
+
+  /// Sets best_ to the largest similarity of each block's pixel to the first hits of the neighbouring blocks, or to one
+  /// that is at least kSimilar; to 1 for pixels that are not wanted.
+  /// @param offset index of the first block's pixel
+  template <class Wanted>
+  void compare(const std::array<const FirstRow*, 3>& near, const PointColumns& pixels, size_t offset,
+               const Wanted& wanted) {
+    const PointColumns::Reader reader = pixels.reader();
+    for (uint32_t begin = 0; begin < half_.width; begin += kBlocksTogether) {
+      const uint32_t count = std::min(kBlocksTogether, half_.width - begin);
+      uint32_t open = 0;
+      for (uint32_t bx = begin; bx < begin + count; ++bx) {
+        const bool compared = wanted(bx);
+        best_[bx] = compared ? 0.0f : 1.0f, open += compared ? 1 : 0;
+      }
+      for (size_t i = 0; i < kNeighbours.size() && open > 0; ++i) {
+        const FirstRow& row = *near[kNeighbours[i][1]];
+        open = raise_similarities(count, reader, offset + begin, row.points.reader(), row.shown.data(),
+                                  size_t{begin} + kNeighbours[i][0], &best_[begin]);
+      }
+    }
+  }
+
+  static constexpr uint32_t kNoPixel = UINT32_MAX, kBlocksTogether = 32;
+  /// Columns and rows of the neighbouring blocks, from 0 to 2; near ones first.
+  static constexpr std::array<std::array<uint32_t, 2>, 8> kNeighbours{
+      {{0, 1}, {2, 1}, {1, 0}, {1, 2}, {0, 0}, {2, 0}, {0, 2}, {2, 2}}};
+
+  const GBuffer& full_;
+  const ImageSize half_;
+  const std::vector<uint32_t>& first_;
+  std::array<FirstRow, 3> rows_;
+  std::array<uint32_t, 3> loaded_{UINT32_MAX, UINT32_MAX, UINT32_MAX}; ///< their numbers
+  PointColumns pixels_;                                                ///< one of each block
+  std::vector<float> best_, least_;                                    ///< per block
+  std::vector<uint32_t> others_; ///< pixels that compete with the chosen ones; kNoPixel: none does
+};
 
 /// Without the channels that a G-buffer may do without: neither occlusion nor its denoiser reads them.
 GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& pixel) {
@@ -141,100 +177,6 @@ GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_
   return g;
 }
 
-template <size_t kLayers>
-class Upsampler {
-public:
-  using Layers = std::array<float, kLayers>; ///< values of a pixel
-
-  Upsampler(const GBuffer& full, const HalfGBuffer& half, const std::array<std::span<const float>, kLayers>& ao)
-      : full_(full), half_(half), ao_(ao) {}
-
-  Layers values(uint32_t x, uint32_t y) const {
-    const size_t pixel = size_t{y} * full_.size.width + x;
-    if (!is_hit(full_, pixel)) return no_values();
-    const ImageSize size = half_.gbuffer.size;
-    const uint32_t bx = x / 2, by = y / 2;
-    if (const size_t own = size_t{by} * size.width + bx; half_.pixel[own] == pixel) return at(own);
-    Means near;
-    // A half pixel less than two full pixels away belongs to the pixel's own block or to the closer neighbouring block
-    // on each axis: the one before for the first pixel of a block, the one after for the second.
-    const uint32_t x0 = bx - (x % 2 == 0 && bx > 0 ? 1 : 0), y0 = by - (y % 2 == 0 && by > 0 ? 1 : 0);
-    for_blocks(size, x0, y0, bx + x % 2, by + y % 2, [&](size_t i, uint32_t nx, uint32_t ny) {
-      const auto [dx, dy] = distances(x, y, i, nx, ny);
-      if (dx < 2 && dy < 2 && is_hit(half_.gbuffer, i))
-        near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), at(i));
-    });
-    Layers values = near.values(kMinWeight);
-    if (std::ranges::all_of(values, [](float v) { return v >= 0.0f; })) return values;
-    const Layers others = values_around(x, y, pixel);
-    for (size_t layer = 0; layer < kLayers; ++layer)
-      if (values[layer] < 0.0f) values[layer] = others[layer];
-    return values;
-  }
-
-private:
-  /// Weighted means of the valid values of each layer.
-  struct Means {
-    Layers weight{}, sum{}, lo, hi;
-    Means() { lo.fill(INFINITY), hi.fill(-INFINITY); }
-    void add(float w, const Layers& v) {
-      if (!(w > 0.0f)) return;
-      for (size_t i = 0; i < kLayers; ++i)
-        if (v[i] >= 0.0f)
-          weight[i] += w, sum[i] += w * v[i], lo[i] = std::min(lo[i], v[i]), hi[i] = std::max(hi[i], v[i]);
-    }
-    /// kInvalidAo where the total weight is less than `least`.
-    Layers values(float least) const {
-      Layers v = no_values();
-      for (size_t i = 0; i < kLayers; ++i)
-        if (weight[i] >= least) v[i] = std::clamp(sum[i] / weight[i], lo[i], hi[i]); // rounding leaves the range
-      return v;
-    }
-  };
-
-  static Layers no_values() {
-    Layers none;
-    none.fill(kInvalidAo);
-    return none;
-  }
-  Layers at(size_t i) const {
-    Layers v;
-    for (size_t layer = 0; layer < kLayers; ++layer) v[layer] = ao_[layer][i];
-    return v;
-  }
-
-  /// Means over the 5 x 5 nearest blocks.
-  Layers values_around(uint32_t x, uint32_t y, size_t pixel) const {
-    Means far, unlike;
-    for_neighbours(half_.gbuffer.size, x / 2, y / 2, 2, [&](size_t i, uint32_t nx, uint32_t ny) {
-      if (!is_hit(half_.gbuffer, i)) return;
-      const auto [dx, dy] = distances(x, y, i, nx, ny);
-      const float closeness = 1.0f / (1.0f + dx * dx + dy * dy);
-      const Relation r = relate(full_, pixel, half_.pixel[i]);
-      far.add(closeness * similarity(r), at(i));
-      const float similar = (1.0f + r.cosine) * (1.0f - r.slope2);
-      unlike.add(similar > 0.0f ? closeness * (similar * similar + 1e-6f) : closeness * 1e-6f, at(i));
-    });
-    Layers values = far.values(kMinWeightFar);
-    const Layers others = unlike.values(std::numeric_limits<float>::min());
-    for (size_t layer = 0; layer < kLayers; ++layer)
-      if (values[layer] < 0.0f) values[layer] = others[layer];
-    return values;
-  }
-
-  /// Distances of a half pixel along both axes, in full pixels.
-  std::array<float, 2> distances(uint32_t x, uint32_t y, size_t i, uint32_t bx, uint32_t by) const {
-    const uint32_t width = full_.size.width, in_block = half_.pixel[i] - (2 * by * width + 2 * bx);
-    const uint32_t row = in_block >= width ? 1 : 0;
-    return {std::abs(static_cast<float>(2 * bx + in_block - row * width) - static_cast<float>(x)),
-            std::abs(static_cast<float>(2 * by + row) - static_cast<float>(y))};
-  }
-
-  const GBuffer& full_;
-  const HalfGBuffer& half_;
-  const std::array<std::span<const float>, kLayers> ao_;
-};
-
 } // namespace
 
 HalfGBuffer halve(const GBuffer& full) {
@@ -242,32 +184,14 @@ HalfGBuffer halve(const GBuffer& full) {
   const std::vector<uint32_t> first = first_hits(full, size);
   HalfGBuffer half;
   half.pixel.resize(size.pixels());
-  for_each_row(size.height, [&](uint32_t by) {
-    for (uint32_t bx = 0; bx < size.width; ++bx)
-      half.pixel[size_t{by} * size.width + bx] = least_similar(full, size, first, bx, by);
-  });
+  tbb::parallel_for(tbb::blocked_range<uint32_t>(0, size.height, kBlockRows),
+                    [&](const tbb::blocked_range<uint32_t>& range) {
+                      PixelChooser chooser(full, size, first);
+                      for (uint32_t by = range.begin(); by != range.end(); ++by)
+                        chooser.choose(by, &half.pixel[size_t{by} * size.width]);
+                    });
   half.gbuffer = pixels_of(full, size, half.pixel);
   return half;
 }
-
-template <size_t kLayers>
-std::array<std::vector<float>, kLayers> upsample_ao(const GBuffer& full, const HalfGBuffer& half,
-                                                    const std::array<std::span<const float>, kLayers>& layers) {
-  const Upsampler<kLayers> upsampler(full, half, layers);
-  std::array<std::vector<float>, kLayers> result;
-  for (std::vector<float>& layer : result) layer.resize(full.size.pixels());
-  for_each_row(full.size.height, [&](uint32_t y) {
-    for (uint32_t x = 0; x < full.size.width; ++x) {
-      const std::array<float, kLayers> values = upsampler.values(x, y);
-      for (size_t i = 0; i < kLayers; ++i) result[i][size_t{y} * full.size.width + x] = values[i];
-    }
-  });
-  return result;
-}
-
-template std::array<std::vector<float>, 1> upsample_ao(const GBuffer&, const HalfGBuffer&,
-                                                       const std::array<std::span<const float>, 1>&);
-template std::array<std::vector<float>, 2> upsample_ao(const GBuffer&, const HalfGBuffer&,
-                                                       const std::array<std::span<const float>, 2>&);
 
 } // namespace packtrace
