@@ -27,7 +27,7 @@ std::string viewer_footer() {
                 "  packtrace view house.ptk house.pbrt\n"
                 "  packtrace view house.ptk --headless tour.jsonl\n"
                 "  packtrace view house.ptk --profile 300 --csv frames.csv\n"
-                "  packtrace view town.ptk --target-ms 33";
+                "  packtrace view town.ptk --target-ms 0";
 }
 
 } // namespace
