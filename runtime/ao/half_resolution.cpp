@@ -88,7 +88,7 @@ public:
         const bool inside = column < full_.size.width && 2 * by + y < full_.size.height;
         const bool competes = inside && least_[bx] > 0.0f && pixel != first[bx] && is_hit(full_, pixel);
         others_[bx] = competes ? pixel : kNoPixel;
-        if (competes) pixels_.set(bx, surface_point(full_, pixel));
+        if (competes) pixels_.set(bx, pixel_surface(full_, pixel));
         any = any || competes;
       }
       if (!any) continue;
@@ -115,7 +115,7 @@ private:
     if (number == 0 || number > half_.height) return row;
     for (uint32_t bx = 0; bx < half_.width; ++bx) {
       const uint32_t pixel = first_[size_t{number - 1} * half_.width + bx];
-      row.points.set(bx + 1, surface_point(full_, pixel));
+      row.points.set(bx + 1, pixel_surface(full_, pixel));
       row.shown[bx + 1] = is_hit(full_, pixel) ? 1.0f : 0.0f;
     }
     return row;

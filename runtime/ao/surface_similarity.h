@@ -17,8 +17,8 @@ inline constexpr float kMaxSlope = 0.3f;    ///< sine of the angle between line 
 inline constexpr float kNormalSlack = 1.1f; ///< normals up to acos(1 / 1.1) = 25 degrees apart count as equal
 inline constexpr int kNormalSquarings = 6;  ///< cosine to the power of 64
 
-/// A surface point, its geometric and its shading normal.
-struct SurfacePoint {
+/// What a pixel shows: a point in the world, the geometric and the shading normal.
+struct PixelSurface {
   Vec3 position, geometric, shading;
 };
 
@@ -28,7 +28,7 @@ struct Relation {
   float slope2; ///< squared sine of the angle between their line and the surfaces, the larger one
 };
 
-[[gnu::always_inline]] inline Relation relate(const SurfacePoint& a, const SurfacePoint& b) {
+[[gnu::always_inline]] inline Relation relate(const PixelSurface& a, const PixelSurface& b) {
   const Vec3 line = b.position - a.position;
   const float extent = larger(larger(std::abs(line.x), std::abs(line.y)), std::abs(line.z));
   const float scale = extent > 0.0f ? extent : 1.0f;
@@ -53,7 +53,7 @@ public:
   void resize(size_t count) {
     for (std::vector<float>& column : numbers_) column.resize(count);
   }
-  void set(size_t i, const SurfacePoint& p) {
+  void set(size_t i, const PixelSurface& p) {
     for (glm::length_t axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<size_t>(axis);
       numbers_[a][i] = p.position[axis], numbers_[3 + a][i] = p.geometric[axis], numbers_[6 + a][i] = p.shading[axis];
@@ -63,7 +63,7 @@ public:
   /// Pointers that stores to other arrays cannot change.
   struct Reader {
     std::array<const float*, 9> n;
-    [[gnu::always_inline]] SurfacePoint at(size_t i) const {
+    [[gnu::always_inline]] PixelSurface at(size_t i) const {
       return {{n[0][i], n[1][i], n[2][i]}, {n[3][i], n[4][i], n[5][i]}, {n[6][i], n[7][i], n[8][i]}};
     }
   };
@@ -77,7 +77,7 @@ private:
   std::array<std::vector<float>, 9> numbers_;
 };
 
-inline SurfacePoint surface_point(const GBuffer& g, size_t pixel) {
+inline PixelSurface pixel_surface(const GBuffer& g, size_t pixel) {
   return {g.position[pixel], g.geometric_normal[pixel], g.normal[pixel]};
 }
 

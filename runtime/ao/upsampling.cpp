@@ -114,7 +114,7 @@ private:
     const uint32_t count = (full_.size.width + 1 - odd) / 2;
     pixels_.resize(count), weights_.resize(count);
     for (uint32_t k = 0; k < count; ++k)
-      pixels_.set(k, surface_point(full_, size_t{y} * full_.size.width + 2 * k + odd));
+      pixels_.set(k, pixel_surface(full_, size_t{y} * full_.size.width + 2 * k + odd));
     for (MeanColumns& layer : means_[odd]) layer.clear(count);
     const uint32_t upper = y / 2 + y % 2; // plus 1, as the indices of columns
     for (const uint32_t by : {upper, upper + 1}) {
@@ -148,7 +148,7 @@ private:
     for (uint32_t bx = 0; bx < width; ++bx) {
       const size_t from = size_t{by} * width + bx, to = bx + 1;
       const uint32_t pixel = half_.pixel[from];
-      row.points.set(to, surface_point(full_, pixel));
+      row.points.set(to, pixel_surface(full_, pixel));
       row.x[to] = static_cast<float>(pixel % full_.size.width - 2 * bx);
       row.y[to] = static_cast<float>(pixel / full_.size.width - 2 * by);
       row.shown[to] = is_hit(half_.gbuffer, from) ? 0.25f : 0.0f;
@@ -185,7 +185,7 @@ private:
   /// Means over the 5 x 5 nearest blocks.
   Layers values_around(uint32_t x, uint32_t y, size_t pixel) const {
     std::array<Mean, kLayers> far, unlike;
-    const SurfacePoint point = surface_point(full_, pixel);
+    const PixelSurface point = pixel_surface(full_, pixel);
     const ImageSize size = half_.gbuffer.size;
     const uint32_t bx = x / 2, by = y / 2;
     for (uint32_t ny = by > 2 ? by - 2 : 0; ny <= std::min(size.height - 1, by + 2); ++ny)
@@ -193,7 +193,7 @@ private:
         const size_t i = size_t{ny} * size.width + nx;
         if (!is_hit(half_.gbuffer, i)) continue;
         const float closeness = 1.0f / (1.0f + distance2(x, y, half_.pixel[i]));
-        const Relation r = relate(point, surface_point(full_, half_.pixel[i]));
+        const Relation r = relate(point, pixel_surface(full_, half_.pixel[i]));
         const float similar = (1.0f + r.cosine) * (1.0f - r.slope2);
         const float weight = closeness * similarity(r);
         const float weight_unlike = closeness * (similar > 0.0f ? similar * similar + 1e-6f : 1e-6f);
