@@ -5,9 +5,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "runtime/commands/cli_support.h"
+#include "runtime/commands/cli/cli_support.h"
+#include "runtime/commands/cli/help_formatter.h"
 #include "runtime/commands/commands.h"
-#include "runtime/commands/help_formatter.h"
 
 namespace {
 

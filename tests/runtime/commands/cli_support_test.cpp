@@ -1,4 +1,4 @@
-#include "runtime/commands/cli_support.h"
+#include "runtime/commands/cli/cli_support.h"
 
 #include <algorithm>
 #include <array>
@@ -15,8 +15,8 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/progress.h"
-#include "runtime/commands/option_checks.h"
-#include "runtime/commands/whole_number.h"
+#include "runtime/commands/cli/option_checks.h"
+#include "runtime/commands/cli/whole_number.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {

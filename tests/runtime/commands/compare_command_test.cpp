@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/file_bytes.h"
-#include "runtime/commands/cli_support.h"
+#include "runtime/commands/cli/cli_support.h"
 #include "runtime/image/exr.h"
 #include "runtime/image/png.h"
 #include "tests/runtime/image/image_test_support.h"

@@ -19,7 +19,7 @@
 
 #include "pbrt_import/base/file_bytes.h"
 #include "pbrt_import/base/replaced_file.h"
-#include "runtime/commands/json_output.h"
+#include "runtime/commands/cli/json_output.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "runtime/commands/progress_display.h"
+#include "runtime/commands/cli/progress_display.h"
 
 #include <algorithm>
 #include <memory>
