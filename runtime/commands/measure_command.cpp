@@ -19,12 +19,12 @@
 #include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/json_output.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/cli/option_checks.h"
 #include "runtime/commands/cli/progress_display.h"
 #include "runtime/commands/cli/whole_number.h"
 #include "runtime/commands/commands.h"
 #include "runtime/commands/compare/geometry_compare.h"
-#include "runtime/commands/compare/loaded_scene.h"
 #include "runtime/measure/measure.h"
 #include "runtime/trace/source/float_source.h"
 

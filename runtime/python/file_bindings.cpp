@@ -14,7 +14,7 @@
 
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/file_summary.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 #include "runtime/python/bindings.h"
 
 namespace py = pybind11;

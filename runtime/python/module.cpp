@@ -16,7 +16,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/scene/separate_motion.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 #include "runtime/python/bindings.h"
 
 namespace py = pybind11;

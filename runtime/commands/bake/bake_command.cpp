@@ -23,10 +23,10 @@
 #include "runtime/commands/cli/binary_output.h"
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/json_output.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/cli/option_checks.h"
 #include "runtime/commands/cli/progress_display.h"
-#include "runtime/commands/compare/loaded_scene.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 #include "runtime/motion/motion_keys.h"
 #include "runtime/stopwatch.h"
 

@@ -10,7 +10,7 @@
 
 #include "compress/bake/bake_config.h"
 #include "runtime/commands/bake/proxy_options.h"
-#include "runtime/commands/compare/loaded_scene.h"
+#include "runtime/commands/cli/loaded_scene.h"
 
 namespace packtrace {
 

@@ -6,11 +6,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "runtime/commands/bake/seam_report.h"
 #include "runtime/commands/cli/cli_support.h"
-#include "runtime/commands/compare/loaded_scene.h"
-#include "runtime/commands/info/file_report.h"
-#include "runtime/commands/info/requirement_report.h"
+#include "runtime/commands/cli/loaded_scene.h"
+#include "runtime/commands/reports/file_report.h"
+#include "runtime/commands/reports/requirement_report.h"
+#include "runtime/commands/reports/seam_report.h"
 
 namespace packtrace {
 namespace {

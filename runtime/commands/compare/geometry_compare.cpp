@@ -5,7 +5,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/cli/json_output.h"
-#include "runtime/commands/compare/loaded_scene.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/measure/surface_error.h"
 
 namespace packtrace {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/commands/cli/cli_support.h"
-#include "runtime/commands/denoise/denoiser_options.h"
+#include "runtime/commands/render/denoiser_options.h"
 #include "runtime/commands/render/render_report.h"
 
 namespace packtrace {

@@ -22,14 +22,14 @@
 #include "runtime/commands/cli/binary_output.h"
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/json_output.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/cli/option_checks.h"
 #include "runtime/commands/cli/progress_display.h"
-#include "runtime/commands/compare/loaded_scene.h"
 #include "runtime/commands/export/companion_files.h"
 #include "runtime/commands/export/export_reports.h"
 #include "runtime/commands/export/gltf_options.h"
 #include "runtime/commands/export/shader_export.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 
 namespace packtrace {
 namespace {

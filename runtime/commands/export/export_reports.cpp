@@ -6,7 +6,7 @@
 
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/json_output.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 
 namespace packtrace {
 namespace {

@@ -11,10 +11,10 @@
 #include "pbrt_import/base/with_file.h"
 #include "pbrt_import/files/image_file.h"
 #include "pbrt_import/text/input_file.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/cli/option_checks.h"
 #include "runtime/commands/cli/whole_number.h"
-#include "runtime/commands/compare/loaded_scene.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 
 namespace packtrace {
 namespace {

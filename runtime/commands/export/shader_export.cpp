@@ -8,11 +8,11 @@
 #include "compress/exchange/shader/voxel_shader.h"
 #include "compress/format/voxels/proxy_section.h"
 #include "pbrt_import/base/file_error.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/cli/option_checks.h"
 #include "runtime/commands/cli/whole_number.h"
-#include "runtime/commands/compare/loaded_scene.h"
 #include "runtime/commands/export/image_export.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 
 namespace packtrace {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/cli/option_checks.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 #include "runtime/lod/compaction.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 

@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json_fwd.hpp>
 
-#include "runtime/commands/compare/loaded_scene.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/frame/detail.h"
 #include "runtime/trace/ray_tracer.h"
 

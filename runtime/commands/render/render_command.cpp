@@ -11,7 +11,6 @@
 
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
-#include "runtime/commands/bake/seam_report.h"
 #include "runtime/commands/cli/binary_output.h"
 #include "runtime/commands/cli/json_output.h"
 #include "runtime/commands/cli/progress_display.h"
@@ -21,6 +20,7 @@
 #include "runtime/commands/render/render_report.h"
 #include "runtime/commands/render/render_setup.h"
 #include "runtime/commands/render/voxel_render.h"
+#include "runtime/commands/reports/seam_report.h"
 #include "runtime/commands/sequence/sequence_render.h"
 #include "runtime/stopwatch.h"
 

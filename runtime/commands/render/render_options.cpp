@@ -4,7 +4,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/cli/option_checks.h"
-#include "runtime/commands/denoise/denoiser_options.h"
+#include "runtime/commands/render/denoiser_options.h"
 #include "runtime/commands/render/image_outputs.h"
 #include "runtime/commands/render/render_camera.h"
 

@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "runtime/commands/cli/cli_support.h"
-#include "runtime/commands/compare/loaded_scene.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/render/ao_options.h"
 #include "runtime/commands/render/lod_render.h"
 #include "runtime/commands/render/shade_options.h"

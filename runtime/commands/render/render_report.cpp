@@ -8,9 +8,9 @@
 #include <tbb/global_control.h>
 
 #include "compress/format/file/file_summary.h"
-#include "runtime/commands/bake/seam_report.h"
-#include "runtime/commands/denoise/denoiser_options.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/render/denoiser_options.h"
+#include "runtime/commands/reports/file_report.h"
+#include "runtime/commands/reports/seam_report.h"
 
 namespace packtrace {
 namespace {

@@ -14,7 +14,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
 #include "runtime/commands/cli/binary_output.h"
-#include "runtime/commands/denoise/denoiser_options.h"
+#include "runtime/commands/render/denoiser_options.h"
 #include "runtime/commands/render/render_setup.h"
 #include "runtime/commands/sequence/sequence_checkpoint.h"
 #include "runtime/commands/sequence/sequence_outputs.h"

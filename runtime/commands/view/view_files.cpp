@@ -10,8 +10,8 @@
 #include "compress/format/file/file_summary.h"
 #include "pbrt_import/scene/world_view.h"
 #include "runtime/commands/cli/whole_number.h"
-#include "runtime/commands/info/file_report.h"
 #include "runtime/commands/render/render_camera.h"
+#include "runtime/commands/reports/file_report.h"
 #include "runtime/motion/motion_targets.h"
 
 namespace packtrace {

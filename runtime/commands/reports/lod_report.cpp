@@ -1,9 +1,9 @@
-#include "runtime/commands/info/lod_report.h"
+#include "runtime/commands/reports/lod_report.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 
 namespace packtrace {
 namespace {

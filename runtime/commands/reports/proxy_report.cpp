@@ -1,11 +1,11 @@
-#include "runtime/commands/info/proxy_report.h"
+#include "runtime/commands/reports/proxy_report.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "runtime/commands/denoise/denoiser_options.h"
+#include "runtime/commands/render/denoiser_options.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

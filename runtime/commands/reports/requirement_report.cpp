@@ -1,4 +1,4 @@
-#include "runtime/commands/info/requirement_report.h"
+#include "runtime/commands/reports/requirement_report.h"
 
 #include <array>
 #include <bit>
@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/scene/material_flag_names.h"
-#include "runtime/commands/info/file_report.h"
-#include "runtime/commands/info/proxy_report.h"
+#include "runtime/commands/reports/file_report.h"
+#include "runtime/commands/reports/proxy_report.h"
 
 namespace packtrace {
 namespace {

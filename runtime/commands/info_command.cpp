@@ -14,12 +14,12 @@
 
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/motion_pose.h"
-#include "runtime/commands/bake/seam_report.h"
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/json_output.h"
+#include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/cli/progress_display.h"
-#include "runtime/commands/compare/loaded_scene.h"
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
+#include "runtime/commands/reports/seam_report.h"
 
 namespace packtrace {
 namespace {

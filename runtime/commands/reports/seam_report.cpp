@@ -1,4 +1,4 @@
-#include "runtime/commands/bake/seam_report.h"
+#include "runtime/commands/reports/seam_report.h"
 
 #include <algorithm>
 #include <limits>
@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "runtime/commands/info/file_report.h"
+#include "runtime/commands/reports/file_report.h"
 
 namespace packtrace {
 namespace {

@@ -1,5 +1,5 @@
-#include "runtime/commands/info/file_report.h"
-#include "runtime/commands/info/proxy_report.h"
+#include "runtime/commands/reports/file_report.h"
+#include "runtime/commands/reports/proxy_report.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "runtime/commands/info/lod_report.h"
-#include "runtime/commands/info/requirement_report.h"
+#include "runtime/commands/reports/lod_report.h"
+#include "runtime/commands/reports/requirement_report.h"
 
 namespace packtrace {
 namespace {

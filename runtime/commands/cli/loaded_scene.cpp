@@ -1,4 +1,4 @@
-#include "runtime/commands/compare/loaded_scene.h"
+#include "runtime/commands/cli/loaded_scene.h"
 
 #include <algorithm>
 #include <array>
