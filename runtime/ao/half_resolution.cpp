@@ -12,8 +12,8 @@
 namespace packtrace {
 namespace {
 
-constexpr float kSimilar = 0.99f; ///< similarity at which the search for a more similar block stops
-constexpr uint32_t kBlockRows = 8;
+constexpr uint32_t kBlockRows = 8;  ///< rows of blocks per task
+constexpr float kSimilar = 0.99f;   ///< similarity at which the search for a more similar block stops
 constexpr float kMuchLower = 0.25f; ///< difference of similarity from which another pixel of a block is chosen
 
 constexpr std::array<std::array<uint32_t, 2>, 4> kOffsets{{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}; ///< diagonal first

@@ -13,9 +13,9 @@
 namespace packtrace {
 namespace {
 
-constexpr float kMinWeight = 0.1f;     ///< smallest total weight with which a mean is used
-constexpr float kMinWeightFar = 0.01f; ///< the same for the 5 x 5 nearest blocks
-constexpr uint32_t kUpsampledRows = 16;
+constexpr float kMinWeight = 0.1f;      ///< smallest total weight with which a mean is used
+constexpr float kMinWeightFar = 0.01f;  ///< the same for the 5 x 5 nearest blocks
+constexpr uint32_t kUpsampledRows = 16; ///< rows of pixels per task
 
 /// The half pixels of a row of blocks. Block b has index b + 1, between two that show nothing.
 template <size_t kLayers>
@@ -53,7 +53,7 @@ struct MeanColumns {
   }
 };
 
-/// The blocks that are compared with pixels: one for each pixel, from index `first` on.
+/// The half pixels that pixels are compared with: pixel k with the one at index first + k.
 struct ComparedBlocks {
   PointColumns::Reader points;
   const float *x, *y, *shown;
@@ -75,6 +75,7 @@ void write_weights(uint32_t count, const PointColumns::Reader& pixels, const Com
   }
 }
 
+/// Adds a value with its weight to the mean of each of `count` pixels.
 PACKTRACE_AVX2_CLONES
 void add_values(uint32_t count, const float* weights, const float* values, MeanColumns& columns) {
   float *const weight = columns.weight.data(), *const sum = columns.sum.data(), *const lo = columns.lo.data(),
@@ -116,7 +117,7 @@ private:
     for (uint32_t k = 0; k < count; ++k)
       pixels_.set(k, pixel_surface(full_, size_t{y} * full_.size.width + 2 * k + odd));
     for (MeanColumns& layer : means_[odd]) layer.clear(count);
-    const uint32_t upper = y / 2 + y % 2; // plus 1, as the indices of columns
+    const uint32_t upper = y / 2 + y % 2; // rows of blocks are counted from 1
     for (const uint32_t by : {upper, upper + 1}) {
       const BlockRow<kLayers>& row = blocks(by);
       const float top = static_cast<float>(2 * by) - static_cast<float>(y + 2);
