@@ -110,7 +110,7 @@ inline ProjectedPoint PrimaryCamera::linear_projection(DVec3 world) const {
 
 /// A perspective camera that sees the whole box obliquely from above, for scenes without a camera. Works at any scale;
 /// for an empty or point-like box, the distance is 1.
-/// @param cameras those of the scene; which determine the up axis and whether images are mirrored (world_view.h)
+/// @param cameras those of the scene, which determine the up axis and whether images are mirrored (world_view.h)
 Camera framing_camera(const Bounds& bounds, ImageSize size, std::span<const Camera> cameras);
 
 } // namespace packtrace

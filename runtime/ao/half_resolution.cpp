@@ -74,7 +74,7 @@ public:
 
   /// Writes the pixel of each block of a row that is least similar to the first hits of the neighbouring blocks.
   void choose(uint32_t by, uint32_t* chosen) {
-    const std::array<const FirstRow*, 3> near{&row(by), &row(by + 1), &row(by + 2)};
+    const std::array<const BlockSurfaces*, 3> near{&row(by), &row(by + 1), &row(by + 2)};
     best_.resize(half_.width), least_.resize(half_.width);
     const uint32_t* const first = &first_[size_t{by} * half_.width];
     std::copy_n(first, half_.width, chosen);
@@ -99,33 +99,16 @@ public:
   }
 
 private:
-  /// The first hits of a row of blocks. Block b has index b + 1, between two that show nothing.
-  struct FirstRow {
-    PointColumns points;
-    std::vector<float> shown; ///< 1 or 0
-  };
-
-  /// The row with a number, counted from 1; none shows anything in rows outside the picture.
-  const FirstRow& row(uint32_t number) {
-    const size_t slot = number % rows_.size();
-    FirstRow& row = rows_[slot];
-    if (loaded_[slot] == number) return row;
-    loaded_[slot] = number;
-    row.points.resize(half_.width + 2), row.shown.assign(half_.width + 2, 0.0f);
-    if (number == 0 || number > half_.height) return row;
-    for (uint32_t bx = 0; bx < half_.width; ++bx) {
-      const uint32_t pixel = first_[size_t{number - 1} * half_.width + bx];
-      row.points.set(bx + 1, pixel_surface(full_, pixel));
-      row.shown[bx + 1] = is_hit(full_, pixel) ? 1.0f : 0.0f;
-    }
-    return row;
+  /// The first hits of a row of blocks: BlockSurfaces::load().
+  const BlockSurfaces& row(uint32_t number) {
+    return rows_.at(number, [&](BlockSurfaces& row) { row.load(full_, half_, first_, number); });
   }
 
   /// Sets best_ to the largest similarity of each block's pixel to the first hits of the neighbouring blocks, or to one
   /// that is at least kSimilar; to 1 for pixels that are not wanted.
   /// @param offset index of the first block's pixel
   template <class Wanted>
-  void compare(const std::array<const FirstRow*, 3>& near, const PointColumns& pixels, size_t offset,
+  void compare(const std::array<const BlockSurfaces*, 3>& near, const PointColumns& pixels, size_t offset,
                const Wanted& wanted) {
     const PointColumns::Reader reader = pixels.reader();
     for (uint32_t begin = 0; begin < half_.width; begin += kBlocksTogether) {
@@ -136,7 +119,7 @@ private:
         best_[bx] = compared ? 0.0f : 1.0f, open += compared ? 1 : 0;
       }
       for (size_t i = 0; i < kNeighbours.size() && open > 0; ++i) {
-        const FirstRow& row = *near[kNeighbours[i][1]];
+        const BlockSurfaces& row = *near[kNeighbours[i][1]];
         open = raise_similarities(count, reader, offset + begin, row.points.reader(), row.shown.data(),
                                   size_t{begin} + kNeighbours[i][0], &best_[begin]);
       }
@@ -151,11 +134,10 @@ private:
   const GBuffer& full_;
   const ImageSize half_;
   const std::vector<uint32_t>& first_;
-  std::array<FirstRow, 3> rows_;
-  std::array<uint32_t, 3> loaded_{UINT32_MAX, UINT32_MAX, UINT32_MAX}; ///< their numbers
-  PointColumns pixels_;                                                ///< one of each block
-  std::vector<float> best_, least_;                                    ///< per block
-  std::vector<uint32_t> others_; ///< pixels that compete with the chosen ones; kNoPixel: none does
+  RowCache<BlockSurfaces, 3> rows_;
+  PointColumns pixels_;             ///< one of each block
+  std::vector<float> best_, least_; ///< per block
+  std::vector<uint32_t> others_;    ///< pixels that compete with the chosen ones; kNoPixel: none does
 };
 
 /// Without the channels that a G-buffer may do without: neither occlusion nor its denoiser reads them.

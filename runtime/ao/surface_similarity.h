@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "runtime/camera/gbuffer.h"
@@ -82,5 +84,44 @@ inline PixelSurface pixel_surface(const GBuffer& g, size_t pixel) {
 }
 
 inline bool is_hit(const GBuffer& g, size_t pixel) { return g.instance[pixel] != kNoInstance; }
+
+/// The surfaces that one pixel of each block of 2 x 2 pixels shows, for a row of blocks. Block b has index b + 1,
+/// between two that show nothing.
+struct BlockSurfaces {
+  PointColumns points;
+  std::vector<float> shown; ///< 1 if the pixel shows a surface, else 0
+
+  /// @param half numbers of blocks along both axes
+  /// @param pixels by block: the pixel of `full`
+  /// @param number of the row, counted from 1; none shows anything in rows outside the picture
+  void load(const GBuffer& full, ImageSize half, std::span<const uint32_t> pixels, uint32_t number) {
+    points.resize(half.width + 2), shown.assign(half.width + 2, 0.0f);
+    if (number == 0 || number > half.height) return;
+    for (uint32_t bx = 0; bx < half.width; ++bx) {
+      const uint32_t pixel = pixels[size_t{number - 1} * half.width + bx];
+      points.set(bx + 1, pixel_surface(full, pixel));
+      shown[bx + 1] = is_hit(full, pixel) ? 1.0f : 0.0f;
+    }
+  }
+};
+
+/// Keeps the last kRows rows, each of which is needed for several consecutive ones.
+template <class Row, size_t kRows>
+class RowCache {
+public:
+  RowCache() { numbers_.fill(UINT32_MAX); }
+  /// Returns the row with a number, which is not UINT32_MAX. load(row) fills it if it is not kept.
+  template <class Load>
+  const Row& at(uint32_t number, const Load& load) {
+    const size_t slot = number % kRows;
+    if (numbers_[slot] != number) load(rows_[slot]);
+    numbers_[slot] = number;
+    return rows_[slot];
+  }
+
+private:
+  std::array<Row, kRows> rows_;
+  std::array<uint32_t, kRows> numbers_; ///< UINT32_MAX: none was loaded
+};
 
 } // namespace packtrace

@@ -17,12 +17,11 @@ constexpr float kMinWeight = 0.1f;      ///< smallest total weight with which a 
 constexpr float kMinWeightFar = 0.01f;  ///< the same for the 5 x 5 nearest blocks
 constexpr uint32_t kUpsampledRows = 16; ///< rows of pixels per task
 
-/// The half pixels of a row of blocks. Block b has index b + 1, between two that show nothing.
+/// The half pixels of a row of blocks, with indices as in BlockSurfaces.
 template <size_t kLayers>
 struct BlockRow {
-  PointColumns points;
-  std::vector<float> x, y;  ///< of the full pixel within its block, 0 or 1
-  std::vector<float> shown; ///< 0.25 if it shows a surface, else 0
+  BlockSurfaces surfaces;
+  std::vector<float> x, y; ///< of the full pixel within its block, 0 or 1
   std::array<std::vector<float>, kLayers> ao;
 };
 
@@ -70,7 +69,7 @@ void write_weights(uint32_t count, const PointColumns::Reader& pixels, const Com
   for (uint32_t k = 0; k < count; ++k) {
     const size_t at = size_t{k} + block.first;
     const float dx = std::abs(block.left + block.x[at]), dy = std::abs(block.top + block.y[at]);
-    const float tent = larger(0.0f, 2.0f - dx) * larger(0.0f, 2.0f - dy) * block.shown[at];
+    const float tent = larger(0.0f, 2.0f - dx) * larger(0.0f, 2.0f - dy) * 0.25f * block.shown[at];
     weights[k] = tent * similarity(relate(pixel.at(k), block.points.at(at)));
   }
 }
@@ -123,36 +122,31 @@ private:
       const float top = static_cast<float>(2 * by) - static_cast<float>(y + 2);
       for (const uint32_t first : {odd, odd + 1}) {
         const float left = 2.0f * static_cast<float>(first) - static_cast<float>(2 + odd);
-        write_weights(count, pixels_.reader(),
-                      {row.points.reader(), row.x.data(), row.y.data(), row.shown.data(), left, top, first},
-                      weights_.data());
+        write_weights(
+            count, pixels_.reader(),
+            {row.surfaces.points.reader(), row.x.data(), row.y.data(), row.surfaces.shown.data(), left, top, first},
+            weights_.data());
         for (size_t i = 0; i < kLayers; ++i)
           add_values(count, weights_.data(), row.ao[i].data() + first, means_[odd][i]);
       }
     }
   }
 
-  /// The row of blocks with a number, counted from 1; none shows anything in rows outside the picture.
+  /// The row of blocks with a number: BlockSurfaces::load().
   const BlockRow<kLayers>& blocks(uint32_t number) {
-    BlockRow<kLayers>& row = rows_[number % 2];
-    if (loaded_[number % 2] != number) load(number - 1, row);
-    loaded_[number % 2] = number;
-    return row;
+    return rows_.at(number, [&](BlockRow<kLayers>& row) { load(number, row); });
   }
 
-  void load(uint32_t by, BlockRow<kLayers>& row) const {
-    const uint32_t width = half_.gbuffer.size.width;
-    row.points.resize(width + 2), row.x.resize(width + 2), row.y.resize(width + 2);
-    row.shown.assign(width + 2, 0.0f);
-    for (std::vector<float>& layer : row.ao) layer.resize(width + 2);
-    if (by >= half_.gbuffer.size.height) return;
-    for (uint32_t bx = 0; bx < width; ++bx) {
-      const size_t from = size_t{by} * width + bx, to = bx + 1;
-      const uint32_t pixel = half_.pixel[from];
-      row.points.set(to, pixel_surface(full_, pixel));
-      row.x[to] = static_cast<float>(pixel % full_.size.width - 2 * bx);
-      row.y[to] = static_cast<float>(pixel / full_.size.width - 2 * by);
-      row.shown[to] = is_hit(half_.gbuffer, from) ? 0.25f : 0.0f;
+  void load(uint32_t number, BlockRow<kLayers>& row) const {
+    const ImageSize size = half_.gbuffer.size;
+    row.surfaces.load(full_, size, half_.pixel, number);
+    row.x.resize(size.width + 2), row.y.resize(size.width + 2);
+    for (std::vector<float>& layer : row.ao) layer.resize(size.width + 2);
+    if (number == 0 || number > size.height) return;
+    for (uint32_t bx = 0; bx < size.width; ++bx) {
+      const size_t from = size_t{number - 1} * size.width + bx, to = bx + 1;
+      const uint32_t x = half_.pixel[from] % full_.size.width, y = half_.pixel[from] / full_.size.width;
+      row.x[to] = static_cast<float>(x - 2 * bx), row.y[to] = static_cast<float>(y - 2 * (number - 1));
       for (size_t i = 0; i < kLayers; ++i) row.ao[i][to] = ao_[i][from];
     }
   }
@@ -213,19 +207,19 @@ private:
 
   /// Squared distance of two full pixels.
   float distance2(uint32_t x, uint32_t y, uint32_t pixel) const {
-    const float dx = static_cast<float>(pixel % full_.size.width) - static_cast<float>(x);
-    const float dy = static_cast<float>(pixel / full_.size.width) - static_cast<float>(y);
+    const uint32_t column = pixel % full_.size.width, row = pixel / full_.size.width;
+    const float dx = static_cast<float>(column) - static_cast<float>(x);
+    const float dy = static_cast<float>(row) - static_cast<float>(y);
     return dx * dx + dy * dy;
   }
 
   const GBuffer& full_;
   const HalfGBuffer& half_;
   const std::array<std::span<const float>, kLayers> ao_;
-  std::array<BlockRow<kLayers>, 2> rows_;                  ///< with an even and an odd number
-  std::array<uint32_t, 2> loaded_{UINT32_MAX, UINT32_MAX}; ///< their numbers; UINT32_MAX: not loaded
-  PointColumns pixels_;                                    ///< of a row's even or odd columns
-  std::vector<float> weights_;                             ///< of one half pixel for each of them
-  std::array<std::array<MeanColumns, kLayers>, 2> means_;  ///< of a row's even and odd columns
+  RowCache<BlockRow<kLayers>, 2> rows_;
+  PointColumns pixels_;                                   ///< of a row's even or odd columns
+  std::vector<float> weights_;                            ///< of one half pixel for each of them
+  std::array<std::array<MeanColumns, kLayers>, 2> means_; ///< of a row's even and odd columns
 };
 
 } // namespace

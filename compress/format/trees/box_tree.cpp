@@ -162,7 +162,7 @@ private:
     return best;
   }
 
-  /// Lowers `best` by the splits between bins of an axis.
+  /// Replaces `best` by the cheapest split between bins of an axis if that is cheaper.
   void sweep(const Bins& bins, uint32_t count, size_t axis, Split& best) const {
     std::array<double, kMaxBins> right_cost; // of bins b and above, for b > 0
     BoxLanes box(empty_box());

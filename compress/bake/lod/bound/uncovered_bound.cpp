@@ -19,8 +19,8 @@ bool UncoveredBound::spent() const {
 }
 
 void UncoveredBound::measure(uint32_t triangle, std::span<const uint32_t> found) {
-  source_.gather(simplified_.corner_points(triangle),
-                 found); // the overlay is often complete after the triangles in `found`
+  // The overlay is often complete after the triangles in `found`.
+  source_.gather(simplified_.corner_points(triangle), found);
   const size_t first = parts_.size();
   double least = 0.0;
   const double stated = measure_part(triangle, simplified_.corners(triangle), least);
