@@ -50,12 +50,6 @@ PackedGeometry GeometryPacker::pack(size_t index, const SharedBorders* borders) 
   GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
   if (plan_.geometries[index].deforms) leave_out_normals(needs);
   Draft draft = pack_with(index, needs);
-  // Flat triangles need separate clusters. If only some triangles are flat, those clusters may cost more than the
-  // normals they save, so try both.
-  const bool mixed = draft.packed.stats.flat_triangles > 0 && draft.packed.encoded.stream_bits.normals > 0;
-  needs.infer_normals = false;
-  if (mixed)
-    if (Draft other = pack_with(index, needs); other.packed.bytes() < draft.packed.bytes()) draft = std::move(other);
   if (borders != nullptr && !plan_.geometries[index].deforms &&
       draft.quantized.triangles.size() >= config_.lod_min_triangles) {
     LodLimits limits{config_.lod_levels + 1, {}};

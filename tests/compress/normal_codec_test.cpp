@@ -238,6 +238,18 @@ TEST(NormalFormats, CodesAndDecodedBitsStayAsTheyAre) {
   }
 }
 
+TEST(NormalFormats, TheNearestNormalComesWithItsCode) {
+  for (size_t e = 0; e < kNormalFormats.size(); ++e)
+    for (int i = 0; i < 2000; ++i) {
+      const auto encoding = static_cast<NormalEncoding>(e);
+      const double z = (i + 0.5) / 1000.0 - 1.0, angle = 2.399963 * i; // evenly on the sphere
+      const DVec3 n(std::sqrt(1.0 - z * z) * std::cos(angle), std::sqrt(1.0 - z * z) * std::sin(angle), z);
+      const NearestNormal near = find_nearest_normal(encoding, n);
+      EXPECT_EQ(near.code, encode_normal(encoding, n));
+      EXPECT_EQ(near.decoded, decode_normal(encoding, near.code));
+    }
+}
+
 TEST(NormalFormats, NamesOfOthersAreNotFound) {
   for (const char* name : {"", "auto", "axis", "zsign", "oct8", "AXIS24"}) EXPECT_FALSE(find_normal_encoding(name));
 }

@@ -5,26 +5,17 @@
 #include <tuple>
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include "compress/bake/clusters/cluster_cutter.h"
 #include "compress/bake/clusters/morton.h"
 #include "compress/bake/clusters/renumbering.h"
+#include "compress/bake/clusters/triangle_order.h"
 #include "compress/format/layout/baked_format.h"
 
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kChunkTriangles = 1u << 14; // processed independently; clusters do not cross chunks
-
-struct SortKey {
-  uint32_t rank; ///< rank of the kind
-  uint32_t triangle;
-  uint64_t morton;
-  bool operator<(const SortKey& other) const {
-    return std::tie(rank, morton, triangle) < std::tie(other.rank, other.morton, other.triangle);
-  }
-};
+constexpr uint32_t kChunkTriangles = 1u << 15; // processed independently; clusters do not cross chunks
 
 /// A run of triangles of one kind.
 struct Chunk {
@@ -32,12 +23,12 @@ struct Chunk {
 };
 
 /// Splits a chunk of sorted triangles into clusters. Their `order` indexes the chunk.
-Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const SortKey> keys) {
+Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const PlacedTriangle> keys) {
   Renumbering vertex_numbers(keys.size());
   std::vector<Triangle> vertices;
   std::vector<TreeBox> boxes;
   vertices.reserve(keys.size()), boxes.reserve(keys.size());
-  for (const SortKey& key : keys) {
+  for (const PlacedTriangle& key : keys) {
     const Triangle& t = geometry.triangles[key.triangle];
     Triangle vertex{};
     for (int corner = 0; corner < 3; ++corner) {
@@ -66,7 +57,7 @@ std::vector<uint32_t> rank_kinds(const std::vector<TriangleKind>& kinds) {
   return rank;
 }
 
-std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std::vector<uint32_t>& rank) {
+std::vector<PlacedTriangle> sort_triangles(const QuantizedGeometry& geometry, const std::vector<uint32_t>& rank) {
   int64_t extent = 0;
   for (const LatticePoint& p : geometry.positions)
     for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, p[axis] - geometry.origin[axis]);
@@ -74,7 +65,7 @@ std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std
   const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(extent) * 3));
   const uint32_t shift = bits > kMortonBits ? bits - kMortonBits : 0;
 
-  std::vector<SortKey> keys(geometry.triangles.size());
+  std::vector<PlacedTriangle> keys(geometry.triangles.size());
   tbb::parallel_for(size_t{0}, keys.size(), [&](size_t i) {
     std::array<uint64_t, 3> place{};
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -85,14 +76,14 @@ std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std
       }
       place[axis] = sum >> shift;
     }
-    keys[i] = {rank[geometry.kind_of[i]], static_cast<uint32_t>(i), morton_code(place[0], place[1], place[2])};
+    keys[i] = {morton_code(place[0], place[1], place[2]), static_cast<uint32_t>(i), rank[geometry.kind_of[i]]};
   });
-  tbb::parallel_sort(keys.begin(), keys.end());
+  sort_by_place(keys, static_cast<uint32_t>(rank.size()));
   return keys;
 }
 
 /// Splits the sorted triangles into chunks of one kind and nearly equal size.
-std::vector<Chunk> split_into_chunks(std::span<const SortKey> keys) {
+std::vector<Chunk> split_into_chunks(std::span<const PlacedTriangle> keys) {
   std::vector<Chunk> chunks;
   for (size_t begin = 0; begin < keys.size();) {
     size_t end = begin;
@@ -109,7 +100,7 @@ std::vector<Chunk> split_into_chunks(std::span<const SortKey> keys) {
 } // namespace
 
 GeometryClusters split_geometry(const QuantizedGeometry& geometry) {
-  const std::vector<SortKey> keys = sort_triangles(geometry, rank_kinds(geometry.kinds));
+  const std::vector<PlacedTriangle> keys = sort_triangles(geometry, rank_kinds(geometry.kinds));
   const std::vector<Chunk> chunks = split_into_chunks(keys);
   std::vector<Clusters> split(chunks.size());
   GeometryClusters result;

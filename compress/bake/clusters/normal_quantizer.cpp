@@ -1,6 +1,7 @@
 #include "compress/bake/clusters/normal_quantizer.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 
@@ -10,6 +11,10 @@
 
 namespace packtrace {
 namespace {
+
+/// Encodings to choose from, with ascending numbers of bits.
+constexpr std::array<NormalEncoding, 4> kChoice{NormalEncoding::kAxis12, NormalEncoding::kAxis16,
+                                                NormalEncoding::kOct20, NormalEncoding::kAxis24};
 
 /// Returns 0 for a zero vector.
 DVec3 safe_normalize(DVec3 v) {
@@ -37,31 +42,6 @@ void add_normal_errors(const ErrorStats& errors, QuantizeStats& stats) {
   stats.normal_count += errors.count;
 }
 
-/// Finds triangles whose normals equal the face normal within the limit.
-void find_flat_triangles(double flat_degrees, QuantizedPart& work, QuantizeStats& stats) {
-  // Slightly reduced, so that rounding never lifts a measured angle above the limit.
-  const double flat_chord = 2.0 * std::sin(flat_degrees / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
-  const auto near = [&](const Triangle& t, DVec3 n) {
-    for (int corner = 0; corner < 3; ++corner) {
-      const DVec3 d = work.normals[t[corner]] - n;
-      if (!(glm::dot(d, d) <= flat_chord * flat_chord)) return false;
-    }
-    return true;
-  };
-  const ErrorStats flat_errors = accumulate_errors(work.triangles.size(), [&](size_t i, ErrorStats& errors) {
-    if (!work.stays(i)) return;
-    const Triangle& t = work.triangles[i];
-    const DVec3 n = face_normal(work, t);
-    // Tracing turns normals towards the viewer, so either side of the face is valid.
-    const double sign = near(t, n) ? 1.0 : near(t, -n) ? -1.0 : 0.0;
-    work.flat[i] = sign != 0.0;
-    for (int corner = 0; corner < 3 && sign != 0.0; ++corner)
-      errors.add(angle_degrees(work.normals[t[corner]], sign * n));
-  });
-  stats.flat_triangles += flat_errors.count / 3;
-  add_normal_errors(flat_errors, stats);
-}
-
 /// Replaces each zero normal by the face normal of a triangle that uses it.
 void repair_normals(QuantizedPart& work) {
   for (const Triangle& t : work.triangles)
@@ -71,11 +51,14 @@ void repair_normals(QuantizedPart& work) {
     if (n == DVec3(0.0)) n = DVec3(0.0, 0.0, 1.0);
 }
 
+double decoded_error(DVec3 normal, Vec3 decoded) { return angle_degrees(normal, glm::normalize(DVec3(decoded))); }
+
 bool keeps_error(NormalEncoding encoding, const QuantizedPart& work, double max_error_degrees) {
+  if (format_of(encoding).max_error_degrees <= max_error_degrees) return true;
   std::atomic<bool> kept{true};
   for_each_item(work.normals.size(), [&](size_t i) {
     if (work.smooth[i] == 0 || !kept.load(std::memory_order_relaxed)) return;
-    if (normal_encoding_error(encoding, work.normals[i], encode_normal(encoding, work.normals[i])) > max_error_degrees)
+    if (decoded_error(work.normals[i], find_nearest_normal(encoding, work.normals[i]).decoded) > max_error_degrees)
       kept.store(false, std::memory_order_relaxed);
   });
   return kept;
@@ -83,8 +66,7 @@ bool keeps_error(NormalEncoding encoding, const QuantizedPart& work, double max_
 
 } // namespace
 
-void quantize_normals(const GeometryPart& part, const Mesh& mesh, bool infer, double flat_degrees, QuantizedPart& work,
-                      QuantizeStats& stats) {
+void quantize_normals(const GeometryPart& part, const Mesh& mesh, QuantizedPart& work, QuantizeStats& stats) {
   if (mesh.normals.size() != mesh.positions.size())
     throw Error(ErrorKind::kInput, mesh.name + ": normals and positions differ in number");
   const glm::dmat3 matrix = normal_matrix(part.geometry_from_mesh);
@@ -99,21 +81,51 @@ void quantize_normals(const GeometryPart& part, const Mesh& mesh, bool infer, do
   if (!finite) throw Error(ErrorKind::kInput, mesh.name + ": a normal is not finite");
   if (zeros > 0) repair_normals(work);
   stats.repaired_normals += zeros;
-  if (infer)
-    find_flat_triangles(flat_degrees, work, stats);
-  else
-    work.flat.assign(work.triangles.size(), 0);
+  work.flat.assign(work.triangles.size(), 0);
+}
+
+void find_flat_triangles(double flat_degrees, QuantizedPart& work) {
+  // Slightly reduced, so that rounding never lifts a measured angle above the limit.
+  const double flat_chord = 2.0 * std::sin(flat_degrees / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
+  const auto near = [&](const Triangle& t, DVec3 n) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const DVec3 d = work.normals[t[corner]] - n;
+      if (!(glm::dot(d, d) <= flat_chord * flat_chord)) return false;
+    }
+    return true;
+  };
+  for_each_item(work.triangles.size(), [&](size_t i) {
+    if (!work.stays(i)) return;
+    const Triangle& t = work.triangles[i];
+    const DVec3 n = face_normal(work, t);
+    work.flat[i] = near(t, n) || near(t, -n); // tracing turns normals towards the viewer
+  });
+}
+
+void find_smooth_normals(QuantizedPart& work, QuantizeStats& stats) {
+  const ErrorStats flat_errors = accumulate_errors(work.triangles.size(), [&](size_t i, ErrorStats& errors) {
+    if (work.flat[i] == 0 || !work.stays(i)) return;
+    const Triangle& t = work.triangles[i];
+    const DVec3 n = face_normal(work, t);
+    const double sign = glm::dot(work.normals[t.x], n) < 0.0 ? -1.0 : 1.0;
+    for (int corner = 0; corner < 3; ++corner) errors.add(angle_degrees(work.normals[t[corner]], sign * n));
+  });
+  stats.flat_triangles += flat_errors.count / 3;
+  add_normal_errors(flat_errors, stats);
   work.smooth.assign(work.normals.size(), 0);
   for (size_t i = 0; i < work.triangles.size(); ++i)
     for (int corner = 0; corner < 3 && work.flat[i] == 0 && work.stays(i); ++corner)
       work.smooth[work.triangles[i][corner]] = 1;
-  if (infer)
-    stats.inferred_normals += static_cast<uint64_t>(std::count(work.smooth.begin(), work.smooth.end(), uint8_t{0}));
+}
+
+uint32_t expected_normal_bits(double max_error_degrees) {
+  for (const NormalEncoding encoding : kChoice)
+    if (format_of(encoding).max_error_degrees <= max_error_degrees) return format_of(encoding).bits;
+  return format_of(NormalEncoding::kAxis32).bits;
 }
 
 NormalEncoding choose_normal_encoding(std::span<const QuantizedPart> parts, double max_error_degrees) {
-  for (const NormalEncoding encoding :
-       {NormalEncoding::kAxis12, NormalEncoding::kAxis16, NormalEncoding::kOct20, NormalEncoding::kAxis24})
+  for (const NormalEncoding encoding : kChoice)
     if (std::all_of(parts.begin(), parts.end(),
                     [&](const QuantizedPart& part) { return keeps_error(encoding, part, max_error_degrees); }))
       return encoding;
@@ -125,14 +137,15 @@ void encode_normals(NormalEncoding encoding, QuantizedPart& work, QuantizeStats&
   add_normal_errors(accumulate_errors(work.normals.size(),
                                       [&](size_t i, ErrorStats& errors) {
                                         if (work.smooth[i] == 0) return;
-                                        work.codes[i] = encode_normal(encoding, work.normals[i]);
-                                        errors.add(normal_encoding_error(encoding, work.normals[i], work.codes[i]));
+                                        const NearestNormal near = find_nearest_normal(encoding, work.normals[i]);
+                                        work.codes[i] = near.code;
+                                        errors.add(decoded_error(work.normals[i], near.decoded));
                                       }),
                     stats);
 }
 
 double normal_encoding_error(NormalEncoding encoding, DVec3 normal, uint32_t code) {
-  return angle_degrees(normal, glm::normalize(DVec3(decode_normal(encoding, code))));
+  return decoded_error(normal, decode_normal(encoding, code));
 }
 
 } // namespace packtrace

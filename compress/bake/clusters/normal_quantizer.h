@@ -27,11 +27,18 @@ struct QuantizedPart {
   bool stays(size_t triangle) const { return collapsed[triangle] == 0; }
 };
 
-/// Sets the normals of a part, and which triangles and normals need none stored. Zero normals become face normals.
+/// Sets the normals of a part, and that all its triangles need them. Zero normals become face normals.
 /// Throws Error(kInput) if a normal is not finite or normals and positions differ in number.
-/// @param infer whether triangles are flat if their normals equal the face normal within flat_degrees; else none is
-void quantize_normals(const GeometryPart& part, const Mesh& mesh, bool infer, double flat_degrees, QuantizedPart& work,
-                      QuantizeStats& stats);
+void quantize_normals(const GeometryPart& part, const Mesh& mesh, QuantizedPart& work, QuantizeStats& stats);
+
+/// Flags the triangles whose normals equal the face normal within flat_degrees.
+void find_flat_triangles(double flat_degrees, QuantizedPart& work);
+
+/// Sets which normals are stored, and counts flat triangles and their errors.
+void find_smooth_normals(QuantizedPart& work, QuantizeStats& stats);
+
+/// Bits of the encoding that choose_normal_encoding() returns at the latest.
+uint32_t expected_normal_bits(double max_error_degrees);
 
 /// Returns the encoding with the fewest bits whose largest error is within the limit; kAxis32 if there is none.
 NormalEncoding choose_normal_encoding(std::span<const QuantizedPart> parts, double max_error_degrees);

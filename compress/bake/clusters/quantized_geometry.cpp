@@ -7,6 +7,7 @@
 
 #include "compress/bake/clusters/coinciding_triangles.h"
 #include "compress/bake/clusters/error_stats.h"
+#include "compress/bake/clusters/flat_regions.h"
 #include "compress/bake/clusters/normal_quantizer.h"
 #include "compress/bake/grid/welded_surface.h"
 #include "compress/format/cluster/normal_codec.h"
@@ -48,6 +49,7 @@ public:
       parts[i] = quantize_part(i, std::move(lattice[i]), first_triangle);
       first_triangle += parts[i].triangles.size();
     }
+    choose_flat_triangles(parts);
     out_.normal_encoding = config_.normals ? *config_.normals : choose_normal_encoding(parts, limits_.error_degrees);
     CoincidingTriangles coinciding(source_, count_merged());
     for (size_t i = 0; i < parts.size(); ++i) {
@@ -123,11 +125,35 @@ private:
     work.collapsed = std::span(surface_.collapsed).subspan(first_triangle, work.triangles.size());
     work.corners = std::span(surface_.corners).subspan(first_triangle, work.triangles.size());
     work.flat.assign(work.triangles.size(), 1);
-    if (needs.store_normals())
-      quantize_normals(part, mesh, needs.normals != baked::kOnRequest && needs_.infer_normals, limits_.flat_degrees,
-                       work, out_.stats);
+    if (needs.store_normals()) quantize_normals(part, mesh, work, out_.stats);
+    if (may_infer_normals(needs)) find_flat_triangles(limits_.flat_degrees, work);
     if (needs.store_uvs()) quantize_uvs(mesh, work);
     return work;
+  }
+
+  bool may_infer_normals(const PartNeeds& needs) const {
+    return needs.store_normals() && needs.normals != baked::kOnRequest && needs_.infer_normals;
+  }
+
+  /// Decides which flat triangles go without normals.
+  void choose_flat_triangles(std::span<QuantizedPart> parts) {
+    if (needs_.infer_normals) choose_flat_regions(parts, surface_, estimated_bits());
+    for (size_t i = 0; i < parts.size(); ++i) {
+      if (parts[i].normals.empty()) continue;
+      find_smooth_normals(parts[i], out_.stats);
+      if (may_infer_normals(needs_.parts[i]))
+        out_.stats.inferred_normals +=
+            static_cast<uint64_t>(std::count(parts[i].smooth.begin(), parts[i].smooth.end(), uint8_t{0}));
+    }
+  }
+
+  /// Bits of a vertex in a typical cluster, which is about ten edges wide. A normal counts more than its code, because
+  /// the normals of other vertices in the cluster take fewer bits without it; the factor gave the smallest files.
+  VertexBits estimated_bits() const {
+    const double steps = 10.0 * measure_.median_edge / step_;
+    const uint32_t normal_bits =
+        config_.normals ? format_of(*config_.normals).bits : expected_normal_bits(limits_.error_degrees);
+    return {3.0 * std::log2(std::clamp(steps, 0x1p3, 0x1p32)), 1.275 * normal_bits};
   }
 
   void quantize_positions(const GeometryPart& part, const Mesh& mesh, std::vector<LatticePoint>& lattice) {

@@ -1,6 +1,7 @@
 #include "compress/format/cluster/normal_codec.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 
@@ -32,16 +33,23 @@ double inverse_warp(double x) {
   return t;
 }
 
-Vec3 decode_axis(const NormalFormat& format, NormalFields fields) {
-  const int32_t last = last_x(format);
-  const float scale = 1.0f / static_cast<float>(last);
-  const float u = warp(static_cast<float>(2 * fields.x - last) * scale);
-  const float v = warp(static_cast<float>(2 * fields.y - last) * scale);
+/// Component of a coordinate of an axis encoding.
+float axis_component(int32_t coordinate, int32_t last) {
+  return warp(static_cast<float>(2 * coordinate - last) * (1.0f / static_cast<float>(last)));
+}
+
+/// @param u, v components along the two axes after the chart's
+Vec3 axis_normal(uint32_t chart, float u, float v) {
   // u^2 + v^2 is summed first, so that w keeps its bits if u and v swap places, as they do between charts.
   const float w = std::sqrt(std::max(1.0f - (u * u + v * v), 0.0f));
-  const float signed_w = (fields.chart & 1u) != 0 ? -w : w;
-  const uint32_t axis = fields.chart / 2;
+  const float signed_w = (chart & 1u) != 0 ? -w : w;
+  const uint32_t axis = chart / 2;
   return axis == 0 ? Vec3(signed_w, u, v) : axis == 1 ? Vec3(v, signed_w, u) : Vec3(u, v, signed_w);
+}
+
+Vec3 decode_axis(const NormalFormat& format, NormalFields fields) {
+  const int32_t last = last_x(format);
+  return axis_normal(fields.chart, axis_component(fields.x, last), axis_component(fields.y, last));
 }
 
 Vec3 decode_oct(const NormalFormat& format, NormalFields fields) {
@@ -64,20 +72,23 @@ public:
 
   void search(uint32_t chart, int32_t x0, int32_t x1, int32_t y0, int32_t y1) {
     for (int32_t x = x0; x <= x1; ++x)
-      for (int32_t y = y0; y <= y1; ++y) {
-        // Compares chords, not dot products: cosines this close to 1 are not distinguishable.
-        const DVec3 d = DVec3(decode_normal(encoding_, NormalFields{chart, x, y})) - n_;
-        const double distance = glm::dot(d, d);
-        if (distance < distance_) distance_ = distance, best_ = {chart, x, y};
-      }
+      for (int32_t y = y0; y <= y1; ++y) try_code({chart, x, y}, decode_normal(encoding_, NormalFields{chart, x, y}));
   }
 
-  uint32_t code() const { return join_normal_code(encoding_, best_); }
+  void try_code(NormalFields fields, Vec3 decoded) {
+    // Compares chords, not dot products: cosines this close to 1 are not distinguishable.
+    const DVec3 d = DVec3(decoded) - n_;
+    const double distance = glm::dot(d, d);
+    if (distance < distance_) distance_ = distance, best_ = fields, decoded_ = decoded;
+  }
+
+  NearestNormal result() const { return {join_normal_code(encoding_, best_), decoded_}; }
 
 private:
   NormalEncoding encoding_;
   DVec3 n_;
   NormalFields best_;
+  Vec3 decoded_{};
   double distance_ = 5.0; // squared chords of the unit sphere are at most 4
 };
 
@@ -100,7 +111,13 @@ void search_axis(Nearest& nearest, int32_t last, DVec3 n) {
     if (std::abs(n[other]) > std::abs(n[axis])) axis = other;
   const int32_t x = code_below(inverse_warp(n[(axis + 1) % 3]), last);
   const int32_t y = code_below(inverse_warp(n[(axis + 2) % 3]), last);
-  nearest.search(static_cast<uint32_t>(2 * axis) + (n[axis] < 0.0 ? 1 : 0), x, x + 1, y, y + 1);
+  const auto chart = static_cast<uint32_t>(2 * axis) + (n[axis] < 0.0 ? 1u : 0u);
+  const std::array<float, 2> v{axis_component(y, last), axis_component(y + 1, last)};
+  for (int32_t i = 0; i < 2; ++i) {
+    const float u = axis_component(x + i, last);
+    nearest.try_code({chart, x + i, y}, axis_normal(chart, u, v[0]));
+    nearest.try_code({chart, x + i, y + 1}, axis_normal(chart, u, v[1]));
+  }
 }
 
 void search_oct(Nearest& nearest, int32_t last, DVec3 n) {
@@ -181,7 +198,9 @@ Vec3 decode_normal(NormalEncoding encoding, uint32_t code) {
   return decode_normal(encoding, split_normal_code(encoding, code));
 }
 
-uint32_t encode_normal(NormalEncoding encoding, DVec3 n) {
+uint32_t encode_normal(NormalEncoding encoding, DVec3 n) { return find_nearest_normal(encoding, n).code; }
+
+NearestNormal find_nearest_normal(NormalEncoding encoding, DVec3 n) {
   // Scaling by the largest component first keeps the squares from overflow and underflow.
   n /= std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
   n /= glm::length(n);
@@ -198,7 +217,7 @@ uint32_t encode_normal(NormalEncoding encoding, DVec3 n) {
     search_oct(nearest, last_x(format) - 1, n); // an even number of codes leaves one code unused
     break;
   }
-  return nearest.code();
+  return nearest.result();
 }
 
 } // namespace packtrace

@@ -101,4 +101,13 @@ Vec3 decode_normal(NormalEncoding encoding, uint32_t code);
 /// Source for oct: Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", 2014.
 uint32_t encode_normal(NormalEncoding encoding, DVec3 n);
 
+/// A code and what it decodes to.
+struct NearestNormal {
+  uint32_t code = 0;
+  Vec3 decoded{};
+};
+
+/// Like encode_normal(), without decoding the code again.
+NearestNormal find_nearest_normal(NormalEncoding encoding, DVec3 n);
+
 } // namespace packtrace

@@ -228,6 +228,37 @@ std::vector<uint32_t> counted(size_t count) {
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   return order;
 }
+
+/// Cuts boxes into subtrees of a limited size.
+class Cutter {
+public:
+  Cutter(std::span<const TreeBox> boxes, uint32_t max_count, std::vector<uint32_t>& order)
+      : splitter_(boxes, max_count), max_count_(max_count), order_(order) {}
+
+  /// Appends the ends of the subtrees of order[first .. first + count) to `ends`.
+  void cut(uint32_t first, uint32_t count, uint32_t levels, std::vector<uint32_t>& ends) const {
+    if (count <= max_count_) return ends.push_back(first + count);
+    const std::span<uint32_t> numbers = std::span(order_).subspan(first, count);
+    TreeBox whole;
+    const TreeBox centres = splitter_.measure(numbers, whole);
+    const uint32_t left = splitter_.split(numbers, centres, levels);
+    const auto cut_left = [&] { cut(first, left, levels - 1, ends); };
+    if (count < kParallelCuts) {
+      cut_left();
+      return cut(first + left, count - left, levels - 1, ends);
+    }
+    std::vector<uint32_t> right_ends;
+    tbb::parallel_invoke(cut_left, [&] { cut(first + left, count - left, levels - 1, right_ends); });
+    ends.insert(ends.end(), right_ends.begin(), right_ends.end());
+  }
+
+private:
+  static constexpr uint32_t kParallelCuts = 1u << 14; // smaller runs are cut serially
+  const Splitter splitter_;
+  const uint32_t max_count_;
+  std::vector<uint32_t>& order_;
+};
+
 } // namespace
 
 BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth) {
@@ -242,28 +273,10 @@ BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth) {
 
 std::vector<uint32_t> cut_boxes(std::span<const TreeBox> boxes, uint32_t max_count, std::vector<uint32_t>& order) {
   assert(boxes.size() <= uint64_t{1} << 31 && max_count > 0);
-  struct Run {
-    uint32_t first, count, levels;
-  };
   order = counted(boxes.size());
   std::vector<uint32_t> ends;
-  std::vector<Run> waiting;
-  if (!boxes.empty()) waiting.push_back({0, static_cast<uint32_t>(boxes.size()), kDefaultTreeDepth});
-  const Splitter splitter(boxes, max_count);
-  while (!waiting.empty()) {
-    const Run run = waiting.back();
-    waiting.pop_back();
-    if (run.count <= max_count) {
-      ends.push_back(run.first + run.count);
-      continue;
-    }
-    const std::span<uint32_t> numbers = std::span(order).subspan(run.first, run.count);
-    TreeBox whole;
-    const TreeBox centres = splitter.measure(numbers, whole);
-    const uint32_t left = splitter.split(numbers, centres, run.levels);
-    waiting.push_back({run.first + left, run.count - left, run.levels - 1});
-    waiting.push_back({run.first, left, run.levels - 1});
-  }
+  if (!boxes.empty())
+    Cutter(boxes, max_count, order).cut(0, static_cast<uint32_t>(boxes.size()), kDefaultTreeDepth, ends);
   return ends;
 }
 
