@@ -1,10 +1,13 @@
 #include "compress/format/cluster/cluster_codec.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include <gtest/gtest.h>
 
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/cluster/position_kernels.h"
 #include "compress/format/layout/bit_stream.h"
 #include "tests/compress/test_scenes.h"
 
@@ -376,6 +379,41 @@ INSTANTIATE_TEST_SUITE_P(Encodings, ClusterNormals,
                                          NormalEncoding::kAxis16, NormalEncoding::kOct32, NormalEncoding::kOct24,
                                          NormalEncoding::kOct20, NormalEncoding::kOct16, NormalEncoding::kAxis12),
                          [](const auto& test) { return std::string(format_of(test.param).name); });
+
+TEST(ClusterCodec, ThePositionKernelRoundsLikeSinglePositions) {
+  const PositionKernel kernel = position_kernel();
+  if (kernel == nullptr) GTEST_SKIP() << "this processor has none";
+  test::Random random(11);
+  for (int round = 0; round < 2000; ++round) {
+    PositionStream stream;
+    LatticePoint base;
+    const uint32_t most = random.bits() % 3 == 0 ? kMaxKernelPositionBits : 18;
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      stream.width[axis] = std::min(random.bits() % (most + 1), kMaxFieldBits - stream.stride);
+      stream.stride += stream.width[axis];
+      const auto far =
+          static_cast<int64_t>((uint64_t{random.bits()} << 32 | random.bits()) >> (13 + random.bits() % 51));
+      base[axis] = std::min(far, int64_t{1} << kMaxKernelPositionBits) * (random.bits() % 2 == 0 ? 1 : -1);
+      stream.base[axis] = static_cast<double>(base[axis]);
+    }
+    stream.count = 1 + random.bits() % 9;
+    stream.first_bit = random.bits() % 70;
+    stream.step = std::ldexp(8.0 + random.bits() % 8, static_cast<int>(random.bits() % 60) - 50);
+    std::vector<uint8_t> bits((stream.first_bit + uint64_t{stream.stride} * stream.count + 7) / 8 + kReadSlackBytes);
+    for (uint8_t& byte : bits) byte = static_cast<uint8_t>(random.bits());
+    stream.bits = bits.data();
+    std::vector<float> out(size_t{3} * stream.count + 1, -1.0f);
+    kernel(stream, out.data());
+    for (uint32_t v = 0; v < stream.count; ++v) {
+      const PositionFields q = read_position(stream.bits, stream.first_bit + uint64_t{v} * stream.stride,
+                                             stream.width[0], stream.width[1], stream.width[2]);
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        ASSERT_EQ(out[3 * v + axis], from_lattice(base[axis] + static_cast<int64_t>(q.axis[axis]), stream.step))
+            << round;
+    }
+    EXPECT_EQ(out.back(), -1.0f); // nothing is written behind the last position
+  }
+}
 
 } // namespace
 } // namespace packtrace

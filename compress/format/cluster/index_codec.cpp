@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <cstring>
 
 #include "compress/format/layout/bit_stream.h"
 
@@ -74,37 +75,58 @@ void write_strips(const Strips& strips, BitWriter& writer) {
   }
 }
 
+namespace {
+
+/// Vertex numbers of the corner list, with room for whole words behind the last.
+using CornerList = std::array<uint8_t, kMaxClusterCorners + 64>;
+
+/// Reads the corner list. Has no branch per corner, as fresh corners follow no pattern.
+void read_corners(const uint8_t* bits, const IndexLayout& layout, CornerList& corners) {
+  constexpr uint64_t kOnes = 0x0101010101010101u;
+  constexpr uint32_t kStep = 56; // whole bytes of fresh bits, in one field
+  const uint32_t width = layout.index_bits(), count = layout.corner_count();
+  uint64_t explicit_at = layout.explicit_bit();
+  uint32_t used = 0;
+  for (uint32_t first = 0; first < count; first += kStep) {
+    const uint32_t here = std::min(count - first, kStep);
+    const uint64_t fresh = read_bits(bits, layout.fresh_bit() + first, here);
+    for (uint32_t i = 0; i < here; i += 8) {
+      // Byte k of `ones` is fresh bit k; byte k of `numbers` is the number of fresh corners before corner k.
+      const uint64_t spread = (((fresh >> i) & 0xffu) * kOnes) & 0x8040201008040201u;
+      const uint64_t ones = ((spread + 0x7f7f7f7f7f7f7f7fu) >> 7) & kOnes, sums = ones * kOnes;
+      const uint64_t numbers = (sums << 8) + (used & 0xffu) * kOnes; // overflows only behind vertex 255
+      std::memcpy(corners.data() + first + i, &numbers, sizeof numbers);
+      used += static_cast<uint32_t>(sums >> 56);
+    }
+    for (uint64_t named = ~fresh & ((uint64_t{1} << here) - 1); named != 0; named &= named - 1, explicit_at += width)
+      corners[first + static_cast<uint32_t>(std::countr_zero(named))] =
+          static_cast<uint8_t>(read_bits(bits, explicit_at, width));
+  }
+}
+
+} // namespace
+
 void decode_triangles(const uint8_t* bits, const IndexLayout& layout, uint32_t base, std::span<Triangle> triangles) {
   assert(triangles.size() >= layout.triangle_count);
-  const Mask128 restart(bits, 0, layout.triangle_count), left(bits, layout.triangle_count, layout.triangle_count);
-  const uint32_t width = layout.index_bits();
-  uint64_t fresh_at = layout.fresh_bit(), explicit_at = layout.explicit_bit();
-  uint64_t fresh = 0; // unread fresh bits; the lowest is next
-  uint32_t fresh_left = 0, used = base;
-  const auto next_corner = [&] {
-    if (fresh_left == 0) {
-      fresh = read_bits(bits, fresh_at, kMaxFieldBits);
-      fresh_at += kMaxFieldBits;
-      fresh_left = kMaxFieldBits;
-    }
-    const bool is_fresh = (fresh & 1u) != 0;
-    fresh >>= 1, --fresh_left;
-    if (is_fresh) return used++;
-    const auto vertex = static_cast<uint32_t>(read_bits(bits, explicit_at, width));
-    explicit_at += width;
-    return base + vertex;
-  };
+  CornerList corners;
+  read_corners(bits, layout, corners);
+  const uint8_t* next = corners.data();
+  Triangle* out = triangles.data();
   Triangle t{};
-  for (uint32_t i = 0; i < layout.triangle_count; ++i) {
-    if (restart.test(i)) {
-      t.x = next_corner();
-      t.y = next_corner();
-      t.z = next_corner();
-    } else {
-      t = left.test(i) ? Triangle(t.x, t.z, 0) : Triangle(t.z, t.y, 0);
-      t.z = next_corner();
+  for (uint32_t first = 0; first < layout.triangle_count; first += 32) {
+    const uint32_t count = std::min(layout.triangle_count - first, 32u);
+    auto restart = static_cast<uint32_t>(read_bits(bits, first, count));
+    auto left = static_cast<uint32_t>(read_bits(bits, layout.triangle_count + first, count));
+    for (uint32_t i = 0; i < count; ++i, restart >>= 1, left >>= 1) {
+      const uint32_t begins = 0 - (restart & 1u), goes_left = 0 - (left & 1u); // masks
+      const auto select = [](uint32_t mask, uint32_t a, uint32_t b) { return b ^ ((a ^ b) & mask); };
+      const uint32_t x = select(goes_left, t.x, t.z), y = select(goes_left, t.z, t.y);
+      t.x = select(begins, base + next[0], x);
+      t.y = select(begins, base + next[1], y);
+      next += begins & 2u;
+      t.z = base + *next++;
+      *out++ = t;
     }
-    triangles[i] = t;
   }
 }
 
