@@ -17,13 +17,21 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNoCluster = ~0u;
-constexpr double kKept = 0.47; // share of the triangles that a level keeps
+// The share of the triangles that a level keeps. Fine levels take most of the time and space, so they are further
+// apart.
+constexpr double kKept = 0.47, kKeptWhenMany = 0.35;
+constexpr uint64_t kManyTriangles = 2048;
 // The last few hundred triangles are reduced faster: each level adds records that would take more space than its
 // clusters.
 constexpr uint64_t kFewTriangles = 512;
 constexpr double kKeptWhenFew = 0.25;
 constexpr uint64_t kCoarsest = 16;        // levels with at most this many triangles are the last
 constexpr double kInflation = 1.0 + 1e-6; // of bounding spheres, to cover rounding errors
+
+/// The share of its triangles that is kept of a level.
+double kept_of(uint64_t triangles) {
+  return triangles > kManyTriangles ? kKeptWhenMany : triangles > kFewTriangles ? kKept : kKeptWhenFew;
+}
 
 double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }
 
@@ -119,7 +127,7 @@ private:
         progress_.check_cancelled();
         uint64_t triangles = 0;
         for (const uint32_t member : members[i]) triangles += lod_.clusters[member].range.triangle_count;
-        results[i] = simplify_group(members[i], all > kFewTriangles ? kKept : kKeptWhenFew);
+        results[i] = simplify_group(members[i], kept_of(all));
         progress_.advance(triangles);
       });
       give_up(members, results);
