@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -13,8 +14,8 @@
 #include "compress/bake/lod/bound/triangle_overlay.h"
 #include "compress/bake/lod/bound/triangle_refiner.h"
 #include "compress/bake/lod/bound/triangle_set.h"
-#include "compress/bake/lod/simplify/edge_heap.h"
 #include "compress/bake/lod/simplify/edge_placement.h"
+#include "compress/bake/lod/simplify/edge_queue.h"
 #include "compress/bake/lod/simplify/triangle_planes.h"
 #include "pbrt_import/base/cpu.h"
 #include "tests/compress/lod/test_surfaces.h"
@@ -112,41 +113,49 @@ TEST(TriangleRefiner, BoundsTheDistanceOfEveryPoint) {
     }
 }
 
-TEST(EdgeHeap, GivesEdgesByCostThenNumber) {
-  Random random(8);
-  EdgeHeap heap;
-  std::vector<std::pair<float, uint32_t>> expected;
-  for (uint32_t i = 0; i < 1000; ++i) {
-    const float cost = std::floor(random.uniform(0, 100)) * (i % 50 == 0 ? 1e-42f : 1e10f);
-    heap.add(cost, i);
-    expected.emplace_back(cost, i);
+/// Takes all edges, as the simplifier does.
+std::vector<uint32_t> drain(EdgeQueue& queue, const std::vector<float>& costs) {
+  std::vector<uint32_t> order, opened;
+  for (;;) {
+    for (; !queue.heap_empty(); queue.pop()) order.push_back(queue.top());
+    opened.clear();
+    if (!queue.open_next(opened)) return order;
+    for (const uint32_t edge : opened) queue.add(costs[edge], edge);
   }
-  heap.sort();
-  std::sort(expected.begin(), expected.end());
-  for (const auto& [cost, edge] : expected) {
-    ASSERT_FALSE(heap.empty());
-    EXPECT_EQ(heap.top(), edge);
-    heap.pop();
-  }
-  EXPECT_TRUE(heap.empty());
 }
 
-TEST(EdgeHeap, OrdersEdgesWhoseCostsChange) {
-  EdgeHeap heap;
-  for (uint32_t i = 0; i < 40; ++i) heap.add(i, i);
-  heap.sort();
-  ASSERT_EQ(heap.near_count(), EdgeHeap::kNear);
-  std::vector<float> cost(40);
-  for (uint32_t i = 0; i < cost.size(); ++i) cost[i] = static_cast<float>(i);
-  for (size_t place = 0; place < heap.near_count(); ++place) { // some costs go up, some down
-    cost[heap.near(place)] = place % 2 == 0 ? 20.5f + static_cast<float>(place) : 0.25f;
-    heap.change_near(place, cost[heap.near(place)]);
+TEST(EdgeQueue, GivesEdgesByCostThenNumber) {
+  Random random(8);
+  EdgeQueue queue;
+  std::vector<float> costs;
+  std::vector<uint32_t> expected;
+  for (uint32_t i = 0; i < 1000; ++i) {
+    costs.push_back(std::floor(random.uniform(0, 100)) * (i % 50 == 0 ? 1e-42f : 1e10f));
+    expected.push_back(i);
   }
-  heap.restore_order();
-  for (float last = 0.0f; !heap.empty(); heap.pop()) {
-    EXPECT_GE(cost[heap.top()], last);
-    last = cost[heap.top()];
+  costs.back() = std::numeric_limits<float>::max();
+  std::sort(expected.begin(), expected.end(),
+            [&](uint32_t a, uint32_t b) { return std::pair(costs[a], a) < std::pair(costs[b], b); });
+  for (int use = 0; use < 2; ++use) { // the second time, it is not new
+    queue.reset(costs.size());
+    for (uint32_t i = 0; i < costs.size(); ++i) queue.add(i + 1 == costs.size() ? 1e300 : costs[i], i);
+    EXPECT_EQ(drain(queue, costs), expected);
   }
+}
+
+TEST(EdgeQueue, OrdersEdgesWhoseCostsChange) {
+  std::vector<float> costs(40);
+  EdgeQueue queue;
+  queue.reset(costs.size());
+  for (uint32_t i = 0; i < costs.size(); ++i) queue.add(costs[i] = static_cast<float>(i), i);
+  std::vector<uint32_t> opened;
+  while (queue.heap_empty() && queue.open_next(opened))
+    if (opened.size() >= 20) // all up to 19, at least; some costs go up, some go below what is open
+      for (const uint32_t edge : opened)
+        queue.add(costs[edge] = edge % 2 == 0 ? 20.5f + static_cast<float>(edge) : 0.25f, edge);
+  const std::vector<uint32_t> order = drain(queue, costs);
+  ASSERT_EQ(order.size(), costs.size());
+  EXPECT_TRUE(std::is_sorted(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return costs[a] < costs[b]; }));
 }
 
 /// Edges between points with random quadrics, some of them on borders or locked.

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "compress/bake/lod/simplify/corner_lists.h"
-#include "compress/bake/lod/simplify/edge_heap.h"
+#include "compress/bake/lod/simplify/edge_queue.h"
 #include "compress/bake/lod/simplify/surface_edges.h"
 #include "pbrt_import/base/cpu.h"
 
@@ -35,13 +35,13 @@ public:
   void run() {
     surface_ = find_surface_edges(m_, config_);
     start();
-    while (live_ > config_.target_triangles && !heap_.empty()) {
+    for (bool any = true; live_ > config_.target_triangles && any;) {
       const size_t before = live_;
       // Rejected edges may collapse once their surroundings have changed.
       const auto next = static_cast<size_t>(kRetryShare * static_cast<double>(live_));
-      drain_heap(std::max<size_t>(config_.target_triangles, next));
+      any = drain_queue(std::max<size_t>(config_.target_triangles, next));
       if (live_ == before && std::exchange(may_tear_, true)) break;
-      retry_rejected();
+      any |= retry_rejected();
     }
     compact();
     for (uint32_t e = 0; e < same_edge_.size(); ++e) same_edge_[e] = edge_root(e);
@@ -61,6 +61,7 @@ private:
     count_up(wedge_into_, m_.wedges.size());
     count_up(same_edge_, surface_.ends.size());
     stamp_.assign(m_.points.size(), 0);
+    in_star_.assign(m_.points.size(), 0);
     edge_stamp_.assign(surface_.ends.size(), 0);
     DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
     for (const DVec3& p : m_.points) lo = glm::min(lo, p), hi = glm::max(hi, p);
@@ -68,11 +69,10 @@ private:
     rules_.ends_only = config_.keep_points;
     placements_.resize(surface_.ends.size());
     place(surface_.ends, placements_);
-    heap_.reserve(surface_.ends.size());
+    queue_.reset(surface_.ends.size());
     for (uint32_t edge = 0; edge < surface_.ends.size(); ++edge)
       if (const EdgeEnds e = surface_.ends[edge]; m_.locked[e.a] == 0 || m_.locked[e.b] == 0)
-        heap_.add(placements_[edge].cost, edge);
-    heap_.sort();
+        queue_.add(placements_[edge].cost, edge);
   }
 
   void place(std::span<const EdgeEnds> edges, std::span<EdgePlacement> out) const {
@@ -110,50 +110,67 @@ private:
     return edge_stamp_[edge] != stamp_[e.a] + stamp_[e.b];
   }
 
-  void drain_heap(size_t triangles) {
-    while (live_ > triangles && !heap_.empty()) {
-      const uint32_t edge = heap_.top();
+  /// Collapses edges until at most this many triangles are left. Returns false if no edges are left.
+  bool drain_queue(size_t triangles) {
+    while (live_ > triangles) {
+      if (queue_.heap_empty()) {
+        edges_.clear();
+        if (!queue_.open_next(edges_)) return false;
+        add_placed();
+        continue;
+      }
+      const uint32_t edge = queue_.top();
       if (!follow(edge)) {
-        heap_.pop();
+        queue_.pop();
       } else if (is_stale(edge)) {
-        place_near();
+        place_tops();
       } else {
-        heap_.pop();
+        queue_.pop();
         try_collapse(edge);
       }
     }
+    return true;
   }
 
-  /// Recomputes the top edge together with stale edges near the top: four in SIMD lanes cost little more than one.
-  void place_near() {
+  /// Places the stale edges at the top again: four in SIMD lanes cost little more than one.
+  void place_tops() {
     constexpr size_t kLanes = 4;
-    std::array<size_t, kLanes> places{};
-    std::array<EdgeEnds, kLanes> ends{};
-    std::array<EdgePlacement, kLanes> placed;
-    size_t count = 0;
-    for (size_t i = 0; i < heap_.near_count() && count < kLanes; ++i)
-      if (const uint32_t edge = heap_.near(i); follow(edge) && is_stale(edge))
-        places[count] = i, ends[count++] = surface_.ends[edge];
-    place(std::span(ends).first(count), placed);
-    for (size_t i = 0; i < count; ++i) {
-      const uint32_t edge = heap_.near(places[i]);
-      placements_[edge] = placed[i];
-      edge_stamp_[edge] = stamp_[ends[i].a] + stamp_[ends[i].b];
-      heap_.change_near(places[i], placed[i].cost);
-    }
-    heap_.restore_order();
+    edges_.clear();
+    for (; edges_.size() < kLanes && !queue_.heap_empty(); queue_.pop())
+      if (const uint32_t edge = queue_.top(); follow(edge)) {
+        if (!is_stale(edge)) break;
+        edges_.push_back(edge);
+      }
+    add_placed();
   }
 
-  void retry_rejected() {
-    for (const uint32_t edge : rejected_) {
+  /// Adds edges_ to the queue, those that are stale with new costs and except those that can no longer collapse.
+  void add_placed() {
+    size_t stale = 0;
+    stale_ends_.clear();
+    for (const uint32_t edge : edges_) {
       if (!follow(edge)) continue;
-      const EdgeEnds e = surface_.ends[edge];
-      edge_stamp_[edge] = stamp_[e.a] + stamp_[e.b];
-      place(std::span(&e, 1), std::span(&placements_[edge], 1));
-      heap_.add(placements_[edge].cost, edge);
+      if (is_stale(edge))
+        edges_[stale++] = edge, stale_ends_.push_back(surface_.ends[edge]);
+      else
+        queue_.add(placements_[edge].cost, edge);
     }
+    placed_.resize(stale);
+    place(stale_ends_, placed_);
+    for (size_t i = 0; i < stale; ++i) {
+      const uint32_t edge = edges_[i];
+      placements_[edge] = placed_[i];
+      edge_stamp_[edge] = stamp_[stale_ends_[i].a] + stamp_[stale_ends_[i].b];
+      queue_.add(placed_[i].cost, edge);
+    }
+  }
+
+  /// Adds the rejected edges to the queue again. Returns whether there are any.
+  bool retry_rejected() {
+    std::swap(edges_, rejected_);
     rejected_.clear();
-    heap_.sort();
+    add_placed();
+    return !edges_.empty();
   }
 
   // ---- one collapse
@@ -179,12 +196,13 @@ private:
   bool gather_star(uint32_t a, uint32_t b) {
     star_.clear();
     removed_.clear();
+    ++star_number_;
     const auto gather = [&](uint32_t at, uint32_t other, bool is_first) {
       corners_.for_each(at, [&](uint32_t corner) {
         const uint32_t next = corners_.point(CornerLists::next_corner(corner));
         const uint32_t last = corners_.point(CornerLists::last_corner(corner));
         if (next != other && last != other)
-          star_.push_back({corner / 4, next, last, {}});
+          star_.push_back({corner / 4, next, last, {}}), in_star_[next] = in_star_[last] = star_number_;
         else if (is_first)
           removed_.push_back(corner / 4);
       });
@@ -197,19 +215,13 @@ private:
   /// Whether the collapse would remove the only triangle that connects its third point to the edge. The quadrics do not
   /// measure what the surface loses there, so this is allowed only when no other edge can collapse, and never if that
   /// point and an end are locked: the edge between them stays.
-  bool disconnects(uint32_t a, uint32_t b) {
+  bool disconnects(uint32_t a, uint32_t b) const {
     for (const uint32_t triangle : removed_)
       for (uint32_t corner = 4 * triangle; corner < 4 * triangle + 3; ++corner) {
         const uint32_t point = corners_.point(corner);
         if (point == a || point == b) continue;
         if (may_tear_ && (m_.locked[point] == 0 || (m_.locked[a] == 0 && m_.locked[b] == 0))) continue;
-        bool held = false;
-        corners_.for_each(point, [&](uint32_t other) {
-          const uint32_t next = corners_.point(CornerLists::next_corner(other));
-          const uint32_t last = corners_.point(CornerLists::last_corner(other));
-          held |= (next == a || last == a) != (next == b || last == b);
-        });
-        if (!held) return true;
+        if (in_star_[point] != star_number_) return true;
       }
     return false;
   }
@@ -324,9 +336,15 @@ private:
   std::vector<uint32_t> stamp_;      ///< per point: number of changes
   std::vector<uint32_t> edge_stamp_; ///< per edge: sum of its ends' stamps when it was placed
   std::vector<EdgePlacement> placements_;
-  EdgeHeap heap_;
+  EdgeQueue queue_;
   std::vector<uint32_t> rejected_;
+  // what add_placed() adds, and the stale ones among it
+  std::vector<uint32_t> edges_;
+  std::vector<EdgeEnds> stale_ends_;
+  std::vector<EdgePlacement> placed_;
   std::vector<StarTriangle> star_;
+  std::vector<uint32_t> in_star_; ///< per point: star_number_ of the last star with a triangle at it, besides the ends
+  uint32_t star_number_ = 0;
   std::vector<uint32_t> removed_; ///< triangles that contain both ends
 };
 
