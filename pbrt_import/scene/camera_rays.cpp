@@ -90,13 +90,6 @@ double PrimaryCamera::view_z(DVec3 world) const {
   return linear_view_z(world);
 }
 
-DVec3 PrimaryCamera::homogeneous_pixel(DVec3 world) const {
-  const DVec3 c = transform_point(camera_from_world_, world);
-  const double w = projection_ == Projection::kPerspective ? c.z : 1.0;
-  return {size_.width * (c.x - window_.x * w) / (window_.y - window_.x) - offset_px_.x * w,
-          size_.height * (c.y - window_.w * w) / (window_.z - window_.w) - offset_px_.y * w, w};
-}
-
 std::optional<ProjectedPoint> PrimaryCamera::project(DVec3 world) const {
   if (projection_ != Projection::kEnvironment) {
     const ProjectedPoint point = linear_projection(world);

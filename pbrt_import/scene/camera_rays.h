@@ -108,6 +108,13 @@ inline ProjectedPoint PrimaryCamera::linear_projection(DVec3 world) const {
   return {uv * glm::dvec2(size_.width, size_.height) - offset_px_, c.z * depth_scale_};
 }
 
+inline DVec3 PrimaryCamera::homogeneous_pixel(DVec3 world) const {
+  const DVec3 c = transform_point(camera_from_world_, world);
+  const double w = projection_ == Projection::kPerspective ? c.z : 1.0;
+  return {size_.width * (c.x - window_.x * w) / (window_.y - window_.x) - offset_px_.x * w,
+          size_.height * (c.y - window_.w * w) / (window_.z - window_.w) - offset_px_.y * w, w};
+}
+
 /// A perspective camera that sees the whole box obliquely from above, for scenes without a camera. Works at any scale;
 /// for an empty or point-like box, the distance is 1.
 /// @param cameras those of the scene, which determine the up axis and whether images are mirrored (world_view.h)

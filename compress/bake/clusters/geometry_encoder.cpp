@@ -5,10 +5,10 @@
 
 #include <tbb/parallel_for.h>
 
+#include "compress/bake/clusters/renumbering.h"
 #include "compress/format/layout/bit_stream.h"
 #include "compress/format/trees/node_groups.h"
 #include "pbrt_import/base/error.h"
-#include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 namespace {
@@ -26,23 +26,6 @@ void add(ClusterView::StreamBits& total, const ClusterView::StreamBits& bits) {
   total.indices += bits.indices, total.positions += bits.positions, total.normals += bits.normals,
       total.uvs += bits.uvs;
 }
-
-/// Numbers a cluster's vertices 0, 1, ... in order of first use.
-class VertexNumbers {
-public:
-  uint32_t operator()(uint32_t vertex) {
-    const auto next = static_cast<uint32_t>(values_.size());
-    const uint32_t number =
-        table_.find_or_add(mix_words(vertex, 0), next, [&](uint32_t other) { return values_[other] == vertex; });
-    if (number == next) values_.push_back(vertex);
-    return number;
-  }
-  std::span<const uint32_t> values() const { return values_; }
-
-private:
-  WeldTable table_{kMaxClusterVertices};
-  std::vector<uint32_t> values_;
-};
 
 /// Encodes a run of consecutive clusters.
 class ChunkEncoder {
@@ -73,30 +56,26 @@ public:
 private:
   void encode(const ClusterRange& cluster) {
     const TriangleKind& kind = geometry_.kinds[cluster.kind];
-    VertexNumbers numbers;
-    std::vector<Triangle> local_triangles;
+    numbers_.clear(), local_triangles_.clear(), places_.clear();
     for (const Triangle& t : std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count)) {
       // Sequenced x, y, z: argument order is unspecified.
-      const uint32_t x = numbers(t.x), y = numbers(t.y), z = numbers(t.z);
-      local_triangles.emplace_back(x, y, z);
+      const uint32_t x = numbers_(t.x), y = numbers_(t.y), z = numbers_(t.z);
+      local_triangles_.emplace_back(x, y, z);
     }
-    const std::span<const uint32_t> used = numbers.values();
-    std::vector<LatticePoint> places;
-    for (const uint32_t vertex : used) places.push_back(geometry_.positions[geometry_.vertices[vertex].position]);
-    groups_.find(places, local_triangles);
+    const std::span<const uint32_t> used = numbers_.values;
+    for (const uint32_t vertex : used) places_.push_back(geometry_.positions[geometry_.vertices[vertex].position]);
+    groups_.find(places_, local_triangles_);
     const Strips strips = find_strips(groups_.triangles(), static_cast<uint32_t>(used.size()), groups_.ends());
 
-    std::vector<LatticePoint> positions;
-    std::vector<uint32_t> codes;
-    std::vector<UvLattice> uvs;
+    positions_.clear(), codes_.clear(), uvs_.clear();
     for (const uint32_t local : strips.vertex_order) {
       const QuantizedVertex& v = geometry_.vertices[used[local]];
-      positions.push_back(places[local]);
-      if (!kind.flat) codes.push_back(v.normal_code);
-      if (kind.uvs) uvs.push_back(v.uv);
+      positions_.push_back(places_[local]);
+      if (!kind.flat) codes_.push_back(v.normal_code);
+      if (kind.uvs) uvs_.push_back(v.uv);
     }
     const size_t offset = writer_.bytes().size();
-    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind.slot, geometry_.origin,
+    out_.clusters.push_back(encode_cluster({&strips, positions_, codes_, uvs_, kind.slot, geometry_.origin,
                                             geometry_.anchor_shift, geometry_.normal_encoding},
                                            writer_));
     out_.clusters.back().payload_offset = static_cast<uint32_t>(offset / 4);
@@ -145,6 +124,12 @@ private:
   std::vector<uint32_t> expected_vertices_; // of all clusters, in order
   std::vector<Triangle> expected_triangles_;
   size_t first_vertex_ = 0, first_triangle_ = 0;
+  // Of the cluster that is encoded, kept to save allocations.
+  Renumbering numbers_{kMaxClusterVertices}; // the vertices, in order of first use
+  std::vector<Triangle> local_triangles_;
+  std::vector<LatticePoint> places_, positions_; // by local number; by stored number
+  std::vector<uint32_t> codes_;
+  std::vector<UvLattice> uvs_;
   NodeGroups groups_;
   BitWriter writer_;
   EncodedChunk out_;

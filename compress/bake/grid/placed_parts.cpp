@@ -6,18 +6,6 @@
 #include "compress/bake/grid/scene_measure.h"
 
 namespace packtrace {
-namespace {
-
-DVec3 geometry_position(const PlacedPart& placed, const Mesh& mesh, uint32_t vertex) {
-  const DVec3 p(mesh.positions[vertex]);
-  return placed.moved ? transform_point(placed.part->geometry_from_mesh, p) : p;
-}
-
-DVec3 to_world(const PlacedPart& placed, Vec3 p) {
-  return placed.placed ? transform_point(placed.world_from_geometry, DVec3(p)) : DVec3(p);
-}
-
-} // namespace
 
 PlacedParts::PlacedParts(const Scene& scene, const ScenePlan& plan, std::span<const uint32_t> instances,
                          std::span<const GeometryGrid> grids)
@@ -42,15 +30,11 @@ const PlacedPart& PlacedParts::part_of(uint32_t triangle) const {
   return *std::prev(after);
 }
 
-DVec3 PlacedParts::source_position(const PlacedPart& placed, uint32_t vertex) const {
-  return to_world(placed, Vec3(geometry_position(placed, mesh_of(placed), vertex)));
-}
-
 DVec3 PlacedParts::rounded_position(const PlacedPart& placed, uint32_t vertex) const {
   const GeometryGrid& grid = grids_[placed.geometry];
   const double step = grid.grid.step();
-  const LatticePoint q = grid.round(geometry_position(placed, mesh_of(placed), vertex));
-  return to_world(placed, {from_lattice(q[0], step), from_lattice(q[1], step), from_lattice(q[2], step)});
+  const LatticePoint q = grid.round(placed.in_geometry(mesh_of(placed).positions[vertex]));
+  return placed.in_world({from_lattice(q[0], step), from_lattice(q[1], step), from_lattice(q[2], step)});
 }
 
 std::array<DVec3, 3> PlacedParts::corners(uint32_t triangle, Position position) const {

@@ -20,6 +20,10 @@ struct PlacedPart {
   bool moved;  ///< geometry_from_mesh is not the identity
   bool placed; ///< world_from_geometry is not the identity
   double step; ///< of the geometry's coarsest lattice, world units
+
+  /// Geometry space position of a vertex of the mesh.
+  DVec3 in_geometry(Vec3 p) const { return moved ? transform_point(part->geometry_from_mesh, DVec3(p)) : DVec3(p); }
+  DVec3 in_world(Vec3 p) const { return placed ? transform_point(world_from_geometry, DVec3(p)) : DVec3(p); }
 };
 
 /// The camera-visible triangles of chosen instances in world space, with their source positions and with positions on
@@ -39,7 +43,9 @@ public:
   const PlacedPart& part_of(uint32_t triangle) const;
 
   /// World position of a vertex, rounded to a float in geometry space.
-  DVec3 source_position(const PlacedPart& placed, uint32_t vertex) const;
+  DVec3 source_position(const PlacedPart& placed, uint32_t vertex) const {
+    return placed.in_world(Vec3(placed.in_geometry(mesh_of(placed).positions[vertex])));
+  }
   /// World position of a vertex on the lattice, as the file's readers decode it.
   DVec3 rounded_position(const PlacedPart& placed, uint32_t vertex) const;
 

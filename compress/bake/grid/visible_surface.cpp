@@ -85,8 +85,17 @@ private:
     const double margin = 4.0 * movement / (spread_ * (perspective ? depth : 1.0));
     const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
     const auto [top, bottom] = std::minmax({t[0].y, t[1].y, t[2].y});
-    return std::ceil(std::max(left - margin, 0.0) - 0.5) <= std::floor(std::min(right + margin, width_) - 0.5) &&
-           std::ceil(std::max(top - margin, 0.0) - 0.5) <= std::floor(std::min(bottom + margin, height_) - 0.5);
+    return has_centre(std::max(left - margin, 0.0) - 0.5, std::min(right + margin, width_) - 0.5) &&
+           has_centre(std::max(top - margin, 0.0) - 0.5, std::min(bottom + margin, height_) - 0.5);
+  }
+
+  /// Whether there is a whole number in [low, high], that is, ceil(low) <= floor(high).
+  /// @param low at least -0.5 or NaN
+  /// @param high at most the number of pixels or NaN
+  static bool has_centre(double low, double high) {
+    if (!(low <= high)) return false;
+    const auto below = static_cast<int64_t>(high); // truncates, so it is 0 where high is -0.5 to 0
+    return low <= (high < 0.0 ? -1.0 : static_cast<double>(below));
   }
 
   /// @return the number of tested pixels

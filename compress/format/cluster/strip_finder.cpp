@@ -57,8 +57,14 @@ class StripWalk {
 public:
   StripWalk(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends)
       : triangles_(triangles), partners_(triangles), number_(vertex_count, ~0u) {
-    for (uint32_t group = 0, t = 0; group < group_ends.size(); ++group)
+    for (uint32_t group = 0, t = 0; group < group_ends.size(); ++group) {
+      group_begin_[group] = static_cast<uint8_t>(t);
       for (; t < group_ends[group]; ++t) group_of_[t] = static_cast<uint8_t>(group), ++left_in_group_[group];
+      group_size_[group] = left_in_group_[group];
+    }
+    const size_t count = triangles.size(), corners = count + count / 2;
+    strips_.restart.reserve(count), strips_.left.reserve(count), strips_.triangle_order.reserve(count);
+    strips_.corners.reserve(corners), strips_.vertex_order.reserve(std::min(vertex_count, kMaxClusterVertices));
     for (uint32_t t = 0; t < triangles.size(); ++t)
       for (uint32_t e = 0; e < 3; ++e) unvisited_neighbours_[t] += is_in_same_group(t, partners_[3 * t + e]);
   }
@@ -74,11 +80,14 @@ private:
   /// Whether an unvisited triangle is allowed next: the current group is finished, or contains it.
   bool is_allowed_next(uint32_t triangle) const { return left_in_group_[group_] == 0 || group_of_[triangle] == group_; }
 
+  /// Returns the triangle that is allowed next and has the fewest unvisited neighbours; the first of several.
   uint32_t pick_start() const {
-    uint32_t best = ~0u;
-    for (uint32_t t = 0; t < triangles_.size(); ++t)
-      if (!visited_[t] && is_allowed_next(t) && (best == ~0u || unvisited_neighbours_[t] < unvisited_neighbours_[best]))
-        best = t;
+    const bool any = left_in_group_[group_] == 0;
+    const uint32_t begin = any ? 0 : group_begin_[group_];
+    const uint32_t end = any ? static_cast<uint32_t>(triangles_.size()) : begin + group_size_[group_];
+    uint32_t best = ~0u, fewest = 4; // more than a triangle has
+    for (uint32_t t = begin; t < end && fewest > 0; ++t)
+      if (!visited_[t] && unvisited_neighbours_[t] < fewest) best = t, fewest = unvisited_neighbours_[t];
     return best;
   }
 
@@ -147,8 +156,9 @@ private:
       unvisited_neighbours_{}; // by triangle: number of unvisited neighbours in its group
   std::array<bool, kMaxClusterTriangles> visited_{};
   std::array<uint8_t, kMaxClusterTriangles> group_of_{};
-  std::array<uint8_t, kMaxClusterTriangles> left_in_group_{}; // by group: number of unvisited triangles
-  uint32_t group_ = 0;                                        // group of the last triangle; initially the first group
+  std::array<uint8_t, kMaxClusterTriangles> left_in_group_{};          // by group: number of unvisited triangles
+  std::array<uint8_t, kMaxClusterTriangles> group_begin_, group_size_; // by group: range of its triangles
+  uint32_t group_ = 0; // group of the last triangle; initially the first group
   uint32_t restart_count_ = 0;
   Strips strips_;
 };

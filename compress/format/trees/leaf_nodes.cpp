@@ -33,8 +33,9 @@ private:
     RunSplit best{std::numeric_limits<float>::infinity(), 1};
     box = boxes_[first];
     for (uint32_t i = 1; i < count; ++i) {
-      const Float4 cost = half_area(box) * static_cast<float>(i) + right_area[i] * static_cast<float>(count - i);
-      best.improve(first_lane(cost), i, count);
+      const Float4 left_cost = half_area(box) * static_cast<float>(i);
+      if (first_lane(left_cost) > best.cost) break; // the cost of the left side only grows
+      best.improve(first_lane(left_cost + right_area[i] * static_cast<float>(count - i)), i, count);
       box.extend(boxes_[first + i]);
     }
     build(first, best.left);
