@@ -99,6 +99,8 @@ Distance between(const BareMesh& a, const SurfaceDistance& to_a, const BareMesh&
   return {std::max(from_a.rms, from_b.rms), std::max(from_a.max, from_b.max)};
 }
 
+constexpr double kMeasurable = 1e-6; // lattice steps; smaller measured distances are rounding errors
+
 /// Per group, the clusters made from it and the level 0 clusters that it represents.
 class GroupSurfaces {
 public:
@@ -122,8 +124,8 @@ public:
   }
 
   /// Returns the ratio of stated to measured error of each group that made clusters of this level and whose measured
-  /// error is not 0. Measured are the distance of its clusters from the whole of level 0, and the distance from the
-  /// whole level of those level 0 clusters that no other group of the level represents.
+  /// error is not only rounding. Measured are the distance of its clusters from the whole of level 0, and the distance
+  /// from the whole level of those level 0 clusters that no other group of the level represents.
   std::vector<double> ratios(uint32_t level, const std::vector<DVec3>& points, const SurfaceDistance& to_base,
                              const SurfaceDistance& to_level) {
     constexpr size_t kSamples = 3000; // per group
@@ -140,7 +142,7 @@ public:
       const double measured = std::max(surface_distance(points, made, to_base, kSamples).max,
                                        surface_distance(points, base, to_level, kSamples).max);
       measured_[group] = measured;
-      if (measured > 0.0) result.push_back(lod_.groups[group].error / measured);
+      if (measured > kMeasurable) result.push_back(lod_.groups[group].error / measured);
       excess_ = std::max(excess_, measured - lod_.groups[group].error * (1.0 + 1e-6));
     });
     return result;
@@ -154,7 +156,7 @@ public:
     std::vector<double> result;
     for_each_group(level, [&](uint32_t group) {
       for (const uint32_t below : below_[group]) measured_[group] = std::max(measured_[group], measured_[below]);
-      if (measured_[group] > 0.0) result.push_back(lod_.groups[group].error / measured_[group]);
+      if (measured_[group] > kMeasurable) result.push_back(lod_.groups[group].error / measured_[group]);
     });
     return result;
   }
@@ -250,12 +252,20 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
                       {"median_group_stated_to_measured", ratio},
                       {"median_group_stated_to_largest_measured_below", ratio_to_largest}});
   }
-  fmt::print("\nStated : measured, median of all {} groups: {:.2f}, largest below counted {:.2f}\n", all_ratios.size(),
-             median(all_ratios), median(all_ratios_to_largest));
+  const auto largest = [](const std::vector<double>& ratios) {
+    return ratios.empty() ? 1.0 : *std::max_element(ratios.begin(), ratios.end());
+  };
+  fmt::print(
+      "\nStated : measured, median of all {} groups: {:.2f}, largest below counted {:.2f}; of the worst group: {:.2f}, "
+      "{:.2f}\n",
+      all_ratios.size(), median(all_ratios), median(all_ratios_to_largest), largest(all_ratios),
+      largest(all_ratios_to_largest));
   return {{"levels", std::move(levels)},
           {"largest_group_excess", groups.excess() / size},
           {"groups_stated_to_measured", median(all_ratios)},
           {"groups_stated_to_largest_measured_below", median(all_ratios_to_largest)},
+          {"worst_group_stated_to_measured", largest(all_ratios)},
+          {"worst_group_stated_to_largest_measured_below", largest(all_ratios_to_largest)},
           {"cuts", measure_cuts(lod, size)}};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace packtrace {
 namespace {
@@ -21,30 +22,62 @@ bool UncoveredBound::spent() const {
 void UncoveredBound::measure(uint32_t triangle, std::span<const uint32_t> found) {
   // The overlay is often complete after the triangles in `found`.
   source_.gather(simplified_.corner_points(triangle), found);
-  const size_t first = parts_.size();
-  double least = 0.0;
-  const double stated = measure_part(triangle, simplified_.corners(triangle), least);
-  claims_.push_back({stated, triangle, first, parts_.size() - first});
+  Claim claim{0.0, triangle, parts_.size(), 0, {}};
+  const Corners corners = simplified_.corners(triangle);
+  if (overlay(corners, claim.stated)) {
+    if (claim.stated > error_.limit() && !overlay_near(claim.stated)) claim.not_cut = found;
+    note_parts(triangle, mapped_triangles_);
+  } else {
+    claim.stated = cut(corners);
+    note_parts(triangle, refined_);
+  }
+  claim.count = parts_.size() - claim.first;
+  claims_.push_back(claim);
 }
 
 std::vector<PartDistance> UncoveredBound::finish() {
-  std::sort(claims_.rbegin(), claims_.rend());
+  std::make_heap(claims_.begin(), claims_.end());
   std::vector<PartDistance> result;
-  for (const Claim& claim : claims_) {
-    size_t first = claim.first, count = claim.count;
-    double stated = claim.stated;
-    if (stated > error_.limit()) {
-      const Corners corners = simplified_.corners(claim.triangle);
-      source_.gather_within(corners, stated);
-      const size_t begin = parts_.size();
-      const double closer = look_closer(claim.triangle, corners, stated, 0);
-      if (closer < stated) stated = closer, first = begin, count = parts_.size() - begin;
+  while (!claims_.empty()) {
+    std::pop_heap(claims_.begin(), claims_.end());
+    Claim& claim = claims_.back();
+    if (claim.stated > error_.limit() && !claim.not_cut.empty()) {
+      cut_later(claim);
+      std::push_heap(claims_.begin(), claims_.end());
+      continue;
     }
-    error_.largest = std::max(error_.largest, stated);
-    const auto from = parts_.begin() + static_cast<std::ptrdiff_t>(first);
-    result.insert(result.end(), from, from + static_cast<std::ptrdiff_t>(count));
+    if (claim.stated > error_.limit()) {
+      const Corners corners = simplified_.corners(claim.triangle);
+      source_.gather_within(corners, claim.stated);
+      const size_t begin = parts_.size();
+      const double closer = look_closer(claim.triangle, corners, claim.stated, 0);
+      if (closer < claim.stated) claim.stated = closer, claim.first = begin, claim.count = parts_.size() - begin;
+    }
+    error_.largest = std::max(error_.largest, claim.stated);
+    const auto from = parts_.begin() + static_cast<std::ptrdiff_t>(claim.first);
+    result.insert(result.end(), from, from + static_cast<std::ptrdiff_t>(claim.count));
+    claims_.pop_back();
   }
   return result;
+}
+
+/// Tries to bound by subdivision a triangle that has only been overlaid.
+void UncoveredBound::cut_later(Claim& claim) {
+  source_.gather(simplified_.corner_points(claim.triangle), std::exchange(claim.not_cut, {}));
+  const double stated = cut(simplified_.corners(claim.triangle));
+  if (stated >= claim.stated) return;
+  claim.stated = stated, claim.first = parts_.size(), claim.count = refined_.size();
+  note_parts(claim.triangle, refined_);
+}
+
+double UncoveredBound::cut(const Corners& part) {
+  refiner_.begin(source_);
+  refiner_.measure_corners(part);
+  return refine();
+}
+
+void UncoveredBound::note_parts(uint32_t triangle, std::span<const OverlayPiece> pieces) {
+  for (const OverlayPiece& piece : pieces) parts_.push_back({triangle, piece.triangle, piece.distance});
 }
 
 /// Subdivides the part into four while that can lower its bound. Appends the bounds to parts_ and returns the part's
@@ -81,14 +114,13 @@ double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, doubl
 double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, double& least) {
   double by_overlay = kInfinite;
   if (overlay(part, by_overlay) && (by_overlay <= error_.limit() || overlay_near(by_overlay))) {
-    for (const OverlayPiece& piece : mapped_triangles_) parts_.push_back({triangle, piece.triangle, piece.distance});
+    note_parts(triangle, mapped_triangles_);
     return by_overlay;
   }
   refiner_.begin(source_);
   least = refiner_.measure_corners(part);
   const double by_cutting = refine();
-  for (const OverlayPiece& piece : by_overlay < by_cutting ? mapped_triangles_ : refined_)
-    parts_.push_back({triangle, piece.triangle, piece.distance});
+  note_parts(triangle, by_overlay < by_cutting ? mapped_triangles_ : refined_);
   return std::min(by_overlay, by_cutting);
 }
 
