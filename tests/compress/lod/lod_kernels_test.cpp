@@ -143,6 +143,22 @@ TEST(EdgeQueue, GivesEdgesByCostThenNumber) {
   }
 }
 
+TEST(EdgeQueue, TakesAnyCost) {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> costs = {-nan, kInfinite, 1.0, -0.0, nan, -kInfinite, -1.0, 0.0};
+  EdgeQueue queue;
+  queue.reset(costs.size());
+  for (uint32_t i = 0; i < costs.size(); ++i) queue.add(costs[i], i);
+  std::vector<uint32_t> order, opened;
+  while (queue.open_next(opened)) {
+    for (const uint32_t edge : opened) queue.add(costs[edge], edge);
+    for (; !queue.heap_empty(); queue.pop()) order.push_back(queue.top());
+    opened.clear();
+  }
+  EXPECT_EQ(order, (std::vector<uint32_t>{3, 5, 6, 7, 2, 0, 1, 4})); // 0 and below, 1, infinity and NaN
+}
+
 TEST(EdgeQueue, OrdersEdgesWhoseCostsChange) {
   std::vector<float> costs(40);
   EdgeQueue queue;

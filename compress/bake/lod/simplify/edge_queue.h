@@ -28,7 +28,7 @@ public:
     open_ = -1;
   }
 
-  /// @param cost not negative
+  /// @param cost negative costs count as 0, infinity and NaN as the largest float
   void add(double cost, uint32_t edge) {
     const uint64_t key = key_of(cost, edge);
     const auto range = static_cast<int32_t>(key >> kRangeShift);
@@ -73,7 +73,7 @@ private:
   /// The bits of non-negative floats have the same order as their values.
   static uint64_t key_of(double cost, uint32_t edge) {
     constexpr double kLargest = std::numeric_limits<float>::max();
-    const auto rounded = static_cast<float>(std::min(cost, kLargest));
+    const auto rounded = static_cast<float>(cost < kLargest ? (cost > 0.0 ? cost : 0.0) : kLargest); // also -0 is 0
     return (uint64_t{std::bit_cast<uint32_t>(rounded)} << 32) | edge;
   }
 
