@@ -52,8 +52,7 @@ private:
 };
 
 /// Builds strips greedily. It always moves to the triangle with the fewest unvisited neighbours, so that few triangles
-/// are left isolated. Of equal ones it prefers the other turn than the last one, because regular
-/// strips pack better. It leaves a group only when all of the group's triangles are visited.
+/// are left isolated. It leaves a group only when all of the group's triangles are visited.
 class StripWalk {
 public:
   StripWalk(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends)
@@ -133,10 +132,10 @@ private:
       if (better(across(3 * triangle + e), across(3 * triangle + exit))) exit = e;
     uint32_t newest = (exit + 1) % 3;
     for (uint32_t i = 1; i <= 3; ++i) add_corner(triangle, newest + i);
-    for (bool go_left = false;;) {
+    for (;;) {
       const uint16_t right = across(3 * triangle + (newest + 2) % 3), left = across(3 * triangle + newest);
       if (right == kNone && left == kNone) return;
-      go_left = go_left ? better(left, right) : !better(right, left);
+      const bool go_left = better(left, right);
       const uint32_t entry = go_left ? left : right;
       triangle = entry / 3;
       newest = (entry + 2) % 3; // 3 t + e + 2 = e + 2 (mod 3)
