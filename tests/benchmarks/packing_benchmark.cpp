@@ -137,9 +137,10 @@ Json measure_cracks(const Scene& scene) {
   const CrackCounts c = count_cracks(scene, {});
   fmt::print("\nCracks, all shapes of the world as they are, default precision: {} triangles; {} positions in several "
              "clusters, {} cracked; {} in several meshes, {} cracked ({} if each mesh had a 16-bit box of its own); {} "
-             "triangles lost; {} instanced shapes left out\n",
+             "triangles lost; left out: {} without area on the grid, {} equal to others there, {} instanced shapes\n",
              c.triangles, c.shared_between_clusters, c.cracked_between_clusters, c.shared_between_meshes,
-             c.cracked_between_meshes, c.own_box_cracked_between_meshes, c.lost_triangles, c.instanced_shapes);
+             c.cracked_between_meshes, c.own_box_cracked_between_meshes, c.lost_triangles, c.collapsed_triangles,
+             c.coinciding_triangles, c.instanced_shapes);
   return {{"triangles", c.triangles},
           {"instanced_shapes", c.instanced_shapes},
           {"shared_between_clusters", c.shared_between_clusters},
@@ -147,7 +148,9 @@ Json measure_cracks(const Scene& scene) {
           {"shared_between_meshes", c.shared_between_meshes},
           {"cracked_between_meshes", c.cracked_between_meshes},
           {"own_box_cracked_between_meshes", c.own_box_cracked_between_meshes},
-          {"lost_triangles", c.lost_triangles}};
+          {"lost_triangles", c.lost_triangles},
+          {"collapsed_triangles", c.collapsed_triangles},
+          {"coinciding_triangles", c.coinciding_triangles}};
 }
 
 Json measure_input(const PackingInput& input, const Options& options) {

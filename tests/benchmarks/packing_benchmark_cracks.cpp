@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "compress/bake/bake_scene.h"
+#include "compress/bake/grid/collapsed_triangles.h"
 #include "compress/format/cluster/position_grid.h"
 #include "compress/format/file/baked_file.h"
 
@@ -128,19 +129,25 @@ private:
     const baked::GeometryRecord& geometry = file_.geometries()[geometry_of(s)];
     const double step = PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step();
     for (const Triangle& t : scene_.meshes[shape.mesh].triangles) {
+      std::array<LatticePoint, 3> points{};
       std::array<Vec3, 3> corners{};
       for (int corner = 0; corner < 3; ++corner) {
         const DVec3 p = placed(shape, t[corner]);
-        for (int axis = 0; axis < 3; ++axis)
-          corners[static_cast<size_t>(corner)][axis] = from_lattice(to_lattice(p[axis], step), step);
+        const auto at = static_cast<size_t>(corner);
+        for (int axis = 0; axis < 3; ++axis) {
+          const int64_t q = to_lattice(p[axis], step);
+          points[at][static_cast<size_t>(axis)] = q, corners[at][axis] = from_lattice(q, step);
+        }
       }
       const auto found = census_.find(triangle_key(corners));
-      if (found != census_.end() && found->second > 0) {
-        --found->second;
-        continue;
+      if (found != census_.end()) {
+        if (found->second-- <= 0) ++counts_.coinciding_triangles;
+      } else if (!has_area(points[0], points[1], points[2])) {
+        ++counts_.collapsed_triangles;
+      } else {
+        ++counts_.lost_triangles;
+        for (int corner = 0; corner < 3; ++corner) sources_.at(placed(shape, t[corner])).cracked = true;
       }
-      ++counts_.lost_triangles;
-      for (int corner = 0; corner < 3; ++corner) sources_.at(placed(shape, t[corner])).cracked = true;
     }
   }
 

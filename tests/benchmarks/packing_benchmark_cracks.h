@@ -13,7 +13,9 @@ struct CrackCounts {
   uint64_t instanced_shapes = 0;        ///< stored once for several placements, on their own grids; not counted
   uint64_t shared_between_clusters = 0; ///< decoded positions used by several clusters
   uint64_t shared_between_meshes = 0;   ///< source positions used by several shapes
-  uint64_t lost_triangles = 0; ///< source triangles that are not decoded where each corner's grid position puts them
+  uint64_t collapsed_triangles = 0;     ///< source triangles without area on the grid; the file leaves them out
+  uint64_t coinciding_triangles = 0;    ///< source triangles that are decoded less often than they occur on the grid
+  uint64_t lost_triangles = 0; ///< other source triangles that are not decoded where their corners' grid positions are
   uint64_t cracked_between_clusters = 0; ///< upper bound: source positions of lost triangles
   uint64_t cracked_between_meshes = 0;   ///< upper bound: those of them that several shapes use
   /// For comparison: the number of shared_between_meshes that would differ if each shape had a 16-bit box of its own.
@@ -21,7 +23,7 @@ struct CrackCounts {
 };
 
 /// Bakes the scene and computes, for each source position, the decoded position that docs/baked_format.md assigns to
-/// it. Then looks for each source triangle among the decoded triangles with these corners, as often as it occurs.
+/// it. Then looks for each source triangle with area among the decoded triangles with these corners.
 CrackCounts count_cracks(const Scene& scene, const BakeConfig& config);
 
 } // namespace packtrace
