@@ -218,7 +218,7 @@ private:
   const std::array<std::span<const float>, kLayers> ao_;
   RowCache<BlockRow<kLayers>, 2> rows_;
   PointColumns pixels_;                                   ///< of a row's even or odd columns
-  std::vector<float> weights_;                            ///< of one half pixel for each of them
+  std::vector<float> weights_;                            ///< per element of pixels_: of the half pixel that is added
   std::array<std::array<MeanColumns, kLayers>, 2> means_; ///< of a row's even and odd columns
 };
 

@@ -191,7 +191,7 @@ TEST(Requirements, NormalsAreInferredWhereThatMakesTheFileSmaller) {
   for (const Triangle& t : floor.triangles) half_flat.triangles.push_back(t + first);
   EXPECT_EQ(inferred(half_flat), floor.triangles.size());
   EXPECT_EQ(inferred(with_flat_triangles(sphere, 60)), 0u); // scattered: separate clusters would take more bytes
-  // Each region is decided alone: the floor goes without normals, the sphere's single flat triangles keep theirs.
+  // Regions are judged separately: the floor is stored without normals, the sphere's isolated flat triangles with them.
   EXPECT_EQ(inferred(with_flat_triangles(half_flat, 60)), floor.triangles.size());
 }
 

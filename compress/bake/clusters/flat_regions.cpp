@@ -12,8 +12,8 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNoNormal = 0;    ///< Vertex::normal of a flat triangle's vertex
-constexpr double kThinnerBits = 4.0; ///< that a position takes less in a cluster of flat triangles
-constexpr double kClusterBits = 8.0 * (sizeof(baked::ClusterRecord) + 8); ///< of one more cluster, with padding
+constexpr double kThinnerBits = 4.0; ///< saved per position in a cluster of flat triangles
+constexpr double kClusterBits = 8.0 * (sizeof(baked::ClusterRecord) + 8); ///< of an additional cluster: record, padding
 
 /// Use of a position or a vertex, as bits.
 enum Use : uint8_t { kBySmooth = 1, kByFlat = 2 };
@@ -30,8 +30,8 @@ public:
   }
 
 private:
-  /// A distinct vertex at a position that flat triangles use. Each vertex of a flat triangle counts twice: as it is
-  /// stored with its normal, and without.
+  /// A distinct vertex at a position of a flat triangle. Corners of flat triangles have two vertices: one with their
+  /// normal and one with kNoNormal.
   struct Vertex {
     uint32_t position;
     uint32_t normal; ///< 10 bits per axis, or kNoNormal
@@ -79,7 +79,7 @@ private:
     return part.uvs.empty() ? UvLattice{} : part.uvs[part.triangles[i][corner]];
   }
 
-  /// Vertex that a corner would use if it stored its normal.
+  /// Returns the vertex of a corner that is stored with its normal.
   uint32_t vertex(const QuantizedPart& part, size_t i, int corner) {
     const DVec3& n = part.normals[part.triangles[i][corner]];
     const auto component = [](double x) { return static_cast<uint32_t>(std::lround((x + 1.0) * 511.0)); };
@@ -98,7 +98,7 @@ private:
     return found;
   }
 
-  /// Makes flat triangles smooth that save no normal, because smooth triangles use all their vertices.
+  /// Marks flat triangles as smooth if smooth triangles use all their vertices, as they would save no normal.
   void drop_useless_triangles() {
     for_each_triangle([&](QuantizedPart& part, size_t i) {
       if (part.flat[i] == 0) return;
@@ -126,10 +126,10 @@ private:
     });
   }
 
-  /// Makes the triangles of regions smooth that save no bits.
+  /// Marks the triangles of regions that save no bits as smooth.
   void drop_regions() {
     find_regions();
-    std::vector<double> saved(joined_.size()); // per position that stands for a region
+    std::vector<double> saved(joined_.size()); // by the position that is the root of a region
     for (const Vertex& v : vertices_)
       if (v.use == kByFlat)
         saved[region(v.position)] +=

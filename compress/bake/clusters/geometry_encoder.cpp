@@ -124,7 +124,7 @@ private:
   std::vector<uint32_t> expected_vertices_; // of all clusters, in order
   std::vector<Triangle> expected_triangles_;
   size_t first_vertex_ = 0, first_triangle_ = 0;
-  // Of the cluster that is encoded, kept to save allocations.
+  // Buffers of encode(), kept between clusters to avoid allocations.
   Renumbering numbers_{kMaxClusterVertices}; // the vertices, in order of first use
   std::vector<Triangle> local_triangles_;
   std::vector<LatticePoint> places_, positions_; // by local number; by stored number

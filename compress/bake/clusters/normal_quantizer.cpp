@@ -98,7 +98,7 @@ void find_flat_triangles(double flat_degrees, QuantizedPart& work) {
     if (!work.stays(i)) return;
     const Triangle& t = work.triangles[i];
     const DVec3 n = face_normal(work, t);
-    work.flat[i] = near(t, n) || near(t, -n); // tracing turns normals towards the viewer
+    work.flat[i] = near(t, n) || near(t, -n); // either side: tracing turns normals to the viewer
   });
 }
 

@@ -27,17 +27,18 @@ struct QuantizedPart {
   bool stays(size_t triangle) const { return collapsed[triangle] == 0; }
 };
 
-/// Sets the normals of a part, and that all its triangles need them. Zero normals become face normals.
+/// Sets the normals of a part and marks all its triangles as smooth. Zero normals become face normals.
 /// Throws Error(kInput) if a normal is not finite or normals and positions differ in number.
 void quantize_normals(const GeometryPart& part, const Mesh& mesh, QuantizedPart& work, QuantizeStats& stats);
 
-/// Flags the triangles whose normals equal the face normal within flat_degrees.
+/// Marks the triangles as flat whose normals at all corners are within flat_degrees of the face normal or its negative.
 void find_flat_triangles(double flat_degrees, QuantizedPart& work);
 
-/// Sets which normals are stored, and counts flat triangles and their errors.
+/// Marks the normals that smooth triangles use, which are stored. Adds the flat triangles to the statistics, with the
+/// errors of taking their face normals instead.
 void find_smooth_normals(QuantizedPart& work, QuantizeStats& stats);
 
-/// Bits of the encoding that choose_normal_encoding() returns at the latest.
+/// Upper bound of the bits of the encoding that choose_normal_encoding() returns.
 uint32_t expected_normal_bits(double max_error_degrees);
 
 /// Returns the encoding with the fewest bits whose largest error is within the limit; kAxis32 if there is none.

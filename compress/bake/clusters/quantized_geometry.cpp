@@ -147,8 +147,9 @@ private:
     }
   }
 
-  /// Bits of a vertex in a typical cluster, which is about ten edges wide. A normal counts more than its code, because
-  /// the normals of other vertices in the cluster take fewer bits without it; the factor gave the smallest files.
+  /// Bits of a vertex in a typical cluster, which is about ten edges wide. A normal counts for more
+  /// than the bits of its code, because without it the other normals of a cluster often need narrower fields. The
+  /// factor is the one that gave the smallest files.
   VertexBits estimated_bits() const {
     const double steps = 10.0 * measure_.median_edge / step_;
     const uint32_t normal_bits =

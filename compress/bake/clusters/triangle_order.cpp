@@ -1,7 +1,6 @@
 #include "compress/bake/clusters/triangle_order.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <utility>
 
@@ -23,13 +22,12 @@ void sort_by(const std::vector<PlacedTriangle>& from, std::vector<PlacedTriangle
 void sort_by_place(std::vector<PlacedTriangle>& triangles, uint32_t rank_count) {
   constexpr size_t kFewTriangles = 2048; // up to here, comparing is faster than counting digits
   if (triangles.size() <= kFewTriangles) {
-    std::sort(triangles.begin(), triangles.end(), [](const PlacedTriangle& a, const PlacedTriangle& b) {
-      if (a.rank != b.rank) return a.rank < b.rank;
-      return a.morton != b.morton ? a.morton < b.morton : a.triangle < b.triangle;
+    std::stable_sort(triangles.begin(), triangles.end(), [](const PlacedTriangle& a, const PlacedTriangle& b) {
+      return a.rank != b.rank ? a.rank < b.rank : a.morton < b.morton;
     });
     return;
   }
-  uint64_t used = 0; // bits that any place has
+  uint64_t used = 0; // bits that are set in any place
   for (const PlacedTriangle& t : triangles) used |= t.morton;
   constexpr uint32_t kDigitBits = 11;
   std::vector<PlacedTriangle> other(triangles.size());

@@ -94,7 +94,7 @@ private:
   /// @param high at most the number of pixels or NaN
   static bool has_centre(double low, double high) {
     if (!(low <= high)) return false;
-    const auto below = static_cast<int64_t>(high); // truncates, so it is 0 where high is -0.5 to 0
+    const auto below = static_cast<int64_t>(high); // floor(high) unless high is negative
     return low <= (high < 0.0 ? -1.0 : static_cast<double>(below));
   }
 

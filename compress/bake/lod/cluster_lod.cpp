@@ -28,7 +28,7 @@ constexpr double kKeptWhenFew = 0.25;
 constexpr uint64_t kCoarsest = 16;        // levels with at most this many triangles are the last
 constexpr double kInflation = 1.0 + 1e-6; // of bounding spheres, to cover rounding errors
 
-/// The share of its triangles that is kept of a level.
+/// The share of a level's triangles that the next level keeps.
 double kept_of(uint64_t triangles) {
   return triangles > kManyTriangles ? kKeptWhenMany : triangles > kFewTriangles ? kKept : kKeptWhenFew;
 }

@@ -28,7 +28,7 @@ LatticePoint offset(const LatticePoint& base, const PositionFields& fields) {
           base[2] + static_cast<int64_t>(fields.axis[2])};
 }
 
-/// Whether the PositionKernel can decode positions.
+/// Whether coordinates and field widths of a cluster are within the PositionKernel's limits.
 bool fits_kernel(const LatticePoint& base, const baked::ClusterRecord& record) {
   constexpr int64_t kMost = int64_t{1} << kMaxKernelPositionBits;
   for (size_t axis = 0; axis < 3; ++axis)

@@ -94,7 +94,7 @@ void read_corners(const uint8_t* bits, const IndexLayout& layout, CornerList& co
       // Byte k of `ones` is fresh bit k; byte k of `numbers` is the number of fresh corners before corner k.
       const uint64_t spread = (((fresh >> i) & 0xffu) * kOnes) & 0x8040201008040201u;
       const uint64_t ones = ((spread + 0x7f7f7f7f7f7f7f7fu) >> 7) & kOnes, sums = ones * kOnes;
-      const uint64_t numbers = (sums << 8) + (used & 0xffu) * kOnes; // overflows only behind vertex 255
+      const uint64_t numbers = (sums << 8) + (used & 0xffu) * kOnes; // bytes overflow only after vertex 255
       std::memcpy(corners.data() + first + i, &numbers, sizeof numbers);
       used += static_cast<uint32_t>(sums >> 56);
     }

@@ -76,7 +76,7 @@ public:
   }
 
   void try_code(NormalFields fields, Vec3 decoded) {
-    // Compares chords, not dot products: cosines this close to 1 are not distinguishable.
+    // Chords are compared instead of dot products, because cosines of such small angles round to 1.
     const DVec3 d = DVec3(decoded) - n_;
     const double distance = glm::dot(d, d);
     if (distance < distance_) distance_ = distance, best_ = fields, decoded_ = decoded;

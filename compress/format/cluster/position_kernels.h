@@ -4,7 +4,7 @@
 
 namespace packtrace {
 
-/// Positions in a cluster's payload; see docs/baked_format.md, "Cluster".
+/// The positions of a cluster's payload (docs/baked_format.md, "Cluster").
 struct PositionStream {
   const uint8_t* bits = nullptr; ///< 8 bytes are readable behind the last position
   uint64_t first_bit = 0;
@@ -13,7 +13,8 @@ struct PositionStream {
   double base[3] = {};    ///< lattice point of field 0, within +-2^kMaxKernelPositionBits
   double step = 0.0;
 };
-/// Up to here doubles hold all lattice coordinates, and a trick with the bits of doubles replaces the conversion.
+/// Up to this width doubles represent all lattice coordinates, and a field becomes a double by placing its bits in the
+/// mantissa of 2^52.
 inline constexpr uint32_t kMaxKernelPositionBits = 51;
 
 /// Decodes all positions to x, y, z triples.

@@ -28,7 +28,7 @@ void UncoveredBound::measure(uint32_t triangle, std::span<const uint32_t> found)
     if (claim.stated > error_.limit() && !overlay_near(claim.stated)) claim.not_cut = found;
     note_parts(triangle, mapped_triangles_);
   } else {
-    claim.stated = cut(corners);
+    claim.stated = cut(corners).stated;
     note_parts(triangle, refined_);
   }
   claim.count = parts_.size() - claim.first;
@@ -61,19 +61,20 @@ std::vector<PartDistance> UncoveredBound::finish() {
   return result;
 }
 
-/// Tries to bound by subdivision a triangle that has only been overlaid.
+/// Subdivides a triangle that has only been overlaid, and keeps the smaller bound.
 void UncoveredBound::cut_later(Claim& claim) {
   source_.gather(simplified_.corner_points(claim.triangle), std::exchange(claim.not_cut, {}));
-  const double stated = cut(simplified_.corners(claim.triangle));
+  const double stated = cut(simplified_.corners(claim.triangle)).stated;
   if (stated >= claim.stated) return;
   claim.stated = stated, claim.first = parts_.size(), claim.count = refined_.size();
   note_parts(claim.triangle, refined_);
 }
 
-double UncoveredBound::cut(const Corners& part) {
+/// Bounds a part's largest distance from the candidates by subdivision. Writes the pieces to refined_.
+UncoveredBound::CutBounds UncoveredBound::cut(const Corners& part) {
   refiner_.begin(source_);
-  refiner_.measure_corners(part);
-  return refine();
+  const double least = refiner_.measure_corners(part);
+  return {least, refine()};
 }
 
 void UncoveredBound::note_parts(uint32_t triangle, std::span<const OverlayPiece> pieces) {
@@ -117,11 +118,10 @@ double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, doub
     note_parts(triangle, mapped_triangles_);
     return by_overlay;
   }
-  refiner_.begin(source_);
-  least = refiner_.measure_corners(part);
-  const double by_cutting = refine();
-  note_parts(triangle, by_overlay < by_cutting ? mapped_triangles_ : refined_);
-  return std::min(by_overlay, by_cutting);
+  const CutBounds by_cutting = cut(part);
+  least = by_cutting.least;
+  note_parts(triangle, by_overlay < by_cutting.stated ? mapped_triangles_ : refined_);
+  return std::min(by_overlay, by_cutting.stated);
 }
 
 /// Overlays the part on the candidates and writes the pieces to mapped_triangles_. Returns false if none covers it.

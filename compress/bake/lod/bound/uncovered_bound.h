@@ -19,8 +19,8 @@ struct PartDistance {
 
 /// Bounds the distance of simplified triangles from the source surface, for those that no image is known to cover
 /// (ImageCover). Each triangle is first overlaid on nearby source triangles, or subdivided if the overlay does not
-/// cover it. finish() then subdivides the triangles with the largest bounds, if need be further and against every
-/// source triangle that may be near enough; most others are then below the limit and stay as they are.
+/// cover it. finish() then subdivides the triangles with the largest bounds, more finely if needed, against every
+/// source triangle that may be near enough. Triangles with bounds below the limit stay as they are.
 class UncoveredBound {
 public:
   /// @param source, simplified, error, refiner must outlive this object; `source` must be linked
@@ -28,7 +28,8 @@ public:
       : source_(source), simplified_(simplified), error_(error), refiner_(refiner) {}
 
   /// Bounds the distance of a whole simplified triangle.
-  /// @param found source triangles, parts of which may map to it; may contain duplicates; used until finish() ends
+  /// @param found source triangles, parts of which may map to it; may contain duplicates; must stay
+  /// valid until finish() returns
   void measure(uint32_t triangle, std::span<const uint32_t> found);
   /// Tightens the bounds that determine the group's error. Returns bounds that together cover all measured triangles.
   std::vector<PartDistance> finish();
@@ -49,7 +50,10 @@ private:
   bool overlay(const Corners& part, double& stated);
   bool overlay_near(double& stated);
   double refine();
-  double cut(const Corners& part);
+  struct CutBounds {
+    double least, stated; ///< lower and upper bound
+  };
+  CutBounds cut(const Corners& part);
   void cut_later(Claim& claim);
   void note_parts(uint32_t triangle, std::span<const OverlayPiece> pieces);
   double measure_part(uint32_t triangle, const Corners& part, double& least);

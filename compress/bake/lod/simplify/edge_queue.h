@@ -13,7 +13,7 @@
 namespace packtrace {
 
 /// Edges in the order of their collapse costs, compared as floats; edges of equal cost are ordered by number. A heap
-/// holds the edges of the lowest costs. All others wait in lists without order, one per range of costs, until the heap
+/// holds the edges of the lowest costs. All others wait in unordered lists, one per range of costs, until the heap
 /// is empty and open_next() moves the next list into it. Most edges vanish or change their costs while they wait, so
 /// they are never sorted.
 class EdgeQueue {
@@ -73,7 +73,7 @@ private:
   /// The bits of non-negative floats have the same order as their values.
   static uint64_t key_of(double cost, uint32_t edge) {
     constexpr double kLargest = std::numeric_limits<float>::max();
-    const auto rounded = static_cast<float>(cost < kLargest ? (cost > 0.0 ? cost : 0.0) : kLargest); // also -0 is 0
+    const auto rounded = static_cast<float>(cost < kLargest ? (cost > 0.0 ? cost : 0.0) : kLargest); // -0 becomes 0
     return (uint64_t{std::bit_cast<uint32_t>(rounded)} << 32) | edge;
   }
 

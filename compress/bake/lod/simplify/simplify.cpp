@@ -144,7 +144,7 @@ private:
     add_placed();
   }
 
-  /// Adds edges_ to the queue, those that are stale with new costs and except those that can no longer collapse.
+  /// Adds edges_ to the queue, except those that can no longer collapse. Stale edges are placed again first.
   void add_placed() {
     size_t stale = 0;
     stale_ends_.clear();
@@ -338,12 +338,13 @@ private:
   std::vector<EdgePlacement> placements_;
   EdgeQueue queue_;
   std::vector<uint32_t> rejected_;
-  // what add_placed() adds, and the stale ones among it
+  // Edges that add_placed() adds, and the ends and placements of the stale ones.
   std::vector<uint32_t> edges_;
   std::vector<EdgeEnds> stale_ends_;
   std::vector<EdgePlacement> placed_;
   std::vector<StarTriangle> star_;
-  std::vector<uint32_t> in_star_; ///< per point: star_number_ of the last star with a triangle at it, besides the ends
+  std::vector<uint32_t>
+      in_star_; ///< per point: number of the last star that has the point in a triangle, but not as an end
   uint32_t star_number_ = 0;
   std::vector<uint32_t> removed_; ///< triangles that contain both ends
 };
