@@ -170,7 +170,7 @@ void SceneBuilder::execute_directive(Directive& directive) {
   case K::kCamera:
     record_unread_files(directive);
     define_coordinate_system(
-        "camera", {inverse(state_.transform().start), inverse(state_.transform().end), state_.transform().known});
+        "camera", {inverse(state_.transform().start), inverse(state_.transform().end), state_.transform_known()});
     return cameras_.add_camera(directive, state_.transform(), reporter_);
   case K::kFilm:
     return cameras_.add_film(directive, reporter_);
@@ -212,13 +212,15 @@ void SceneBuilder::execute_directive(Directive& directive) {
 
 void SceneBuilder::handle_transform(const Directive& directive) {
   const std::array<double, 16>& n = directive.numbers;
+  if (const DVec3 offset(n[0], n[1], n[2]); directive.kind == K::kTranslate && is_finite(offset))
+    return state_.translate(offset);
   const auto numbers_finite = [&](size_t count) {
     return std::all_of(n.begin(), n.begin() + static_cast<std::ptrdiff_t>(count),
                        [](double v) { return std::isfinite(v); });
   };
   size_t count = 0;
   std::optional<DAffine> map;
-  std::string problem;
+  std::string_view problem;
   switch (directive.kind) {
   case K::kTranslate:
     map = translation({n[0], n[1], n[2]}), count = 3;
@@ -248,7 +250,7 @@ void SceneBuilder::handle_transform(const Directive& directive) {
   if (map && !is_finite(*map)) problem = "its numbers are out of range", map.reset();
   if (!map) {
     state_.mark_transform_unknown();
-    return reporter_.error(directive.place, std::string(directive.keyword) + " is ignored: " + problem);
+    return reporter_.error(directive.place, std::string(directive.keyword) + " is ignored: " + std::string(problem));
   }
   if (directive.kind == K::kIdentity || directive.kind == K::kTransform)
     state_.set_transform(*map);

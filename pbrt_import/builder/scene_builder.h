@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pbrt_import/builder/file_loader.h"
+#include "pbrt_import/builder/instance_residuals.h"
 #include "pbrt_import/builder/mesh_queue.h"
 #include "pbrt_import/builder/tracked_motions.h"
 #include "pbrt_import/import_scene.h"
@@ -77,6 +78,7 @@ private:
   void begin_object(const Directive& directive);
   void add_instance(const Directive& directive);
   Placement place(const Directive& directive, std::string_view thing);
+  bool check_instance(const Directive& directive, const Affine& world_from_object);
 
   void set_scene_time();
   void check_worlds(const Place& end);
@@ -88,7 +90,9 @@ private:
   bool make_ply_mesh(const Directive& directive, Shape& shape);
   LatticeStep read_lattice(const Directive& directive);
   bool make_inline_mesh(Directive& directive, Shape& shape);
+  bool add_mesh(const Directive& directive, std::string_view kind, MeshJob&& job);
   bool make_or_queue(MeshQueue::Entry&& entry);
+  void name_mesh(Mesh& mesh, std::string_view kind, const Place& place);
   void count_kept(const Directive& directive);
   void count_kept(uint64_t bytes);
   bool skip_shape(std::string_view kind, const Place& place, const std::string& problem);
@@ -121,9 +125,12 @@ private:
   std::map<std::string, Place> media_;      ///< position of the MakeNamedMedium by name
   std::map<std::string, Place> media_uses_; ///< position of the first MediumInterface by name
   NameTable object_names_;
+  std::string last_name_;                 ///< name of the last instance, empty before the first
+  uint32_t last_object_ = kNone;          ///< its number in object_names_
   std::vector<uint32_t> objects_by_name_; ///< index into Scene::objects, by number in object_names_
   std::vector<Place> object_places_;
-  std::vector<Affine> instance_residuals_; ///< by instance: rounding error of its transform, see move_far_world()
+  InstanceResiduals instance_residuals_; ///< for move_far_world()
+  glm::mat3 sound_linear_{1.0f};         ///< the last linear part of an instance that is_sound(), as the identity
   uint32_t current_object_ = kNone;
   uint32_t nested_objects_ = 0;  ///< rejected nested ObjectBegins whose ObjectEnd is still to come
   uint64_t ignored_blocks_ = 0;  ///< open blocks beyond the nesting limit

@@ -1,5 +1,6 @@
 // The part of SceneBuilder that deals with worlds, blocks, objects and instances.
 #include <algorithm>
+#include <cstring>
 
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/builder/scene_builder.h"
@@ -108,27 +109,47 @@ void SceneBuilder::add_instance(const Directive& directive) {
     return reporter_.error(directive.place, "ObjectInstance " + in_quotes(name) + " inside object " +
                                                 in_quotes(scene_.objects[current_object_].name) +
                                                 "; objects cannot hold instances");
-  const std::optional<uint32_t> found = object_names_.find(name);
-  if (!found)
+  if (last_object_ == kNone || last_name_ != name) {
+    last_name_ = name;
+    last_object_ = object_names_.find(name).value_or(kNone);
+  }
+  if (last_object_ == kNone)
     return reporter_.error(directive.place,
                            "no object " + in_quotes(name) + "; the instance is skipped" +
                                did_you_mean(object_names_.closest(name, [](uint32_t) { return true; })));
   const Placement placement = place(directive, "instance");
   const Affine world_from_object(placement.map);
-  if (!is_invertible(DAffine(world_from_object)))
-    return reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
-  if (flattens(DAffine(world_from_object)))
-    reporter_.warning(directive.place,
-                      "the instance's transform flattens it (a scale near 0?): its extents differ by a "
-                      "factor of more than a million; voxels and distance fields leave it out");
+  if (!check_instance(directive, world_from_object)) return;
   reserve_one_more(scene_.instances);
   if (placement.animation != kNotAnimated)
     scene_.animated_instances.push_back({static_cast<uint32_t>(scene_.instances.size()), placement.animation});
   if (directive.motion.track != kNoTrack)
     tracked_.add_instance(static_cast<uint32_t>(scene_.instances.size()), directive.motion);
-  scene_.instances.push_back({objects_by_name_[*found], world_from_object});
-  reserve_one_more(instance_residuals_);
-  instance_residuals_.emplace_back(placement.map - DAffine(world_from_object));
+  scene_.instances.push_back({objects_by_name_[last_object_], world_from_object});
+  instance_residuals_.push_back(placement.map, world_from_object);
+}
+
+/// Reports a transform that cannot place an instance, or flattens it.
+/// @return false if the instance must be skipped
+bool SceneBuilder::check_instance(const Directive& directive, const Affine& world_from_object) {
+  if (is_finite(world_from_object[3])) {
+    // Long rows of instances only differ in their translations, so bits are compared first.
+    if (std::memcmp(&world_from_object, &sound_linear_, sizeof sound_linear_) == 0) return true;
+    const glm::mat3 linear(world_from_object);
+    if (is_sound(glm::dmat3(linear))) {
+      sound_linear_ = linear;
+      return true;
+    }
+  }
+  if (!is_invertible(DAffine(world_from_object))) {
+    reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
+    return false;
+  }
+  if (flattens(DAffine(world_from_object)))
+    reporter_.warning(directive.place,
+                      "the instance's transform flattens it (a scale near 0?): its extents differ by a "
+                      "factor of more than a million; voxels and distance fields leave it out");
+  return true;
 }
 
 uint32_t SceneBuilder::add_track(MotionTrack track) {
@@ -137,11 +158,11 @@ uint32_t SceneBuilder::add_track(MotionTrack track) {
 }
 
 SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::string_view thing) {
-  const TransformPair& pair = state_.transform();
-  if (!pair.known)
+  if (!state_.transform_known())
     reporter_.warning(directive.place,
                       "this " + std::string(thing) + " may stand in a wrong place: a transform before it is ignored");
-  if (!state_.animated()) return {pair.start, kNotAnimated};
+  if (!state_.animated()) return {state_.start_transform(), kNotAnimated};
+  const TransformPair pair = state_.transform();
   const std::optional<AnimatedTransform> keys = animate(pair.start, pair.end, transform_times_);
   if (!keys) {
     if (is_invertible(pair.start)) // otherwise the caller reports it

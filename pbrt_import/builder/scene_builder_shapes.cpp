@@ -9,11 +9,18 @@
 #include "pbrt_import/builder/shape_builder.h"
 #include "pbrt_import/language/transforms.h"
 #include "pbrt_import/scene/far_world.h"
+#include "pbrt_import/shapes/mesh_cleanup.h"
 #include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
+namespace {
+
+constexpr uint64_t kMinTaskBytes = 32 * 1024; ///< of a mesh that is worth a task
+constexpr uint64_t kMeshBytes = 128;          ///< for a mesh's name and the rounding of heap blocks
+
+} // namespace
 
 void SceneBuilder::add_shape(Directive& directive) {
   const std::string& kind = directive.names[0];
@@ -117,26 +124,22 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   const ReportFn report = [this, &directive](Severity severity, uint32_t, const std::string& message) {
     reporter_.report(severity, directive.place, directive.names[0] + ": " + message);
   };
-  MeshQueue::Entry entry;
-  entry.kind = kind->name;
-  entry.place = directive.place;
-  entry.sequence = reporter_.sequence();
-  entry.slot = static_cast<uint32_t>(scene_.meshes.size());
-  const std::string problem = problem_of([&] { entry.job = kind->read(directive.parameters, report); });
-  if (kind->name == "trianglemesh") entry.job.given.lattice = read_lattice(directive);
+  MeshJob job;
+  const std::string problem = problem_of([&] { job = kind->read(directive.parameters, report); });
+  if (kind->name == "trianglemesh") job.given.lattice = read_lattice(directive);
   directive.memory.release(); // large arrays have moved into the job
   if (!problem.empty()) return skip_shape(name, directive.place, problem);
-  if (entry.job.scale != 1.0) {
-    shape.parent_from_mesh = compose(shape.parent_from_mesh, scaling(DVec3(entry.job.scale)));
+  if (job.scale != 1.0) {
+    shape.parent_from_mesh = compose(shape.parent_from_mesh, scaling(DVec3(job.scale)));
     if (!is_invertible(shape.parent_from_mesh))
       return skip_shape(name, directive.place, "its size leaves the range of numbers");
   }
-  const std::string same_as = std::move(entry.job.same_as);
+  const std::string same_as = std::move(job.same_as);
   if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : mesh_keys_.find(same_as)) {
     shape.mesh = mesh_slots_by_key_[*known];
     return true;
   }
-  if (!make_or_queue(std::move(entry))) return false;
+  if (!add_mesh(directive, kind->name, std::move(job))) return false;
   shape.mesh = static_cast<uint32_t>(scene_.meshes.size() - 1);
   if (directive.sequence != kNoSequence) sequences_[directive.sequence].mesh = shape.mesh;
   if (!same_as.empty()) {
@@ -153,12 +156,30 @@ uint32_t SceneBuilder::add_sequence(MeshSequence sequence) {
   return static_cast<uint32_t>(sequences_.size() - 1);
 }
 
-/// Adds a mesh to the scene. Large meshes are queued and stay empty until take_queued_meshes().
+/// Adds a mesh to the scene.
+/// @return false if it could not be made
+bool SceneBuilder::add_mesh(const Directive& directive, std::string_view kind, MeshJob&& job) {
+  if (!job.make && job.bytes_at_most < kMinTaskBytes && is_clean(job.given)) {
+    heap_pages_.about_to_allocate(job.bytes_at_most + kMeshBytes);
+    kept_bytes_ += job.bytes_at_most;
+    name_mesh(job.given, kind, directive.place);
+    reserve_one_more(scene_.meshes);
+    scene_.meshes.push_back(std::move(job.given));
+    return true;
+  }
+  MeshQueue::Entry entry;
+  entry.job = std::move(job);
+  entry.kind = kind;
+  entry.place = directive.place;
+  entry.sequence = reporter_.sequence();
+  entry.slot = static_cast<uint32_t>(scene_.meshes.size());
+  return make_or_queue(std::move(entry));
+}
+
+/// Adds a mesh. Large meshes are queued and stay empty until take_queued_meshes().
 /// @return false if the mesh could not be made
 bool SceneBuilder::make_or_queue(MeshQueue::Entry&& entry) {
-  constexpr uint64_t kMinTaskBytes = 32 * 1024;
-  constexpr uint64_t kMin = 128; // for its name and the rounding of heap blocks
-  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kMin);
+  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kMeshBytes);
   const bool small = entry.job.bytes_at_most > 0 && entry.job.bytes_at_most < kMinTaskBytes;
   if (!small) {
     entry.memory = MemoryReservation(options_.memory);
@@ -191,9 +212,13 @@ bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
   for (auto& [severity, message] : entry.made.reports)
     reporter_.report(severity, entry.place, std::string(entry.kind) + ": " + message);
   scene_.dropped_triangles += entry.made.dropped_triangles;
-  mesh_name_.assign(entry.kind).append(":").append(std::to_string(entry.place.line));
-  entry.made.mesh.name = std::string(mesh_name_); // without spare capacity, as there may be many meshes
+  name_mesh(entry.made.mesh, entry.kind, entry.place);
   return entry.made.problem.empty() || skip_shape(entry.kind, entry.place, entry.made.problem);
+}
+
+void SceneBuilder::name_mesh(Mesh& mesh, std::string_view kind, const Place& place) {
+  mesh_name_.assign(kind).append(":").append(std::to_string(place.line));
+  mesh.name = std::string(mesh_name_); // without spare capacity, as there may be many meshes
 }
 
 /// Waits for the queued meshes and stores them. A mesh that could not be made stays empty.
@@ -286,7 +311,7 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   statistics_.cameras_left_out = cameras_.left_out();
   tracked_.renumber(drop_unused_objects(scene_, instance_residuals_, options_.keep_unused_objects, [](uint32_t) {}));
   scene_.motion = tracked_.take(scene_.shapes.size(), cameras_.tracks());
-  move_far_world(scene_, instance_residuals_);
+  move_far_world(scene_, [this](size_t instance, DAffine& map) { instance_residuals_.add_to(map, instance); });
   instance_residuals_ = {};
   const std::vector<uint32_t> mesh_numbers = drop_unused_parts(scene_);
   for (MeshSequence& sequence : sequences_)

@@ -43,10 +43,16 @@ void drop_unused_animations(Scene& scene) {
 
 } // namespace
 
-std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
+std::vector<uint32_t> drop_unused_objects(Scene& scene, InstanceResiduals& residuals, bool keep_unplaced,
                                           const std::function<void(uint32_t object)>& unused) {
   std::vector<uint8_t> shown(scene.objects.size(), keep_unplaced ? 1 : 0);
-  for (const Instance& instance : scene.instances) shown[instance.object] = 1;
+  // Most scenes show every object early, so that few of many instances are visited.
+  size_t hidden = keep_unplaced ? 0 : shown.size();
+  for (size_t i = 0; i < scene.instances.size() && hidden > 0; ++i) {
+    uint8_t& object = shown[scene.instances[i].object];
+    hidden -= object == 0;
+    object = 1;
+  }
   for (uint32_t i = 0; i < scene.objects.size(); ++i) {
     if (!shown[i] && !scene.objects[i].shapes.empty()) unused(i);
     if (scene.objects[i].shapes.empty()) shown[i] = 0;
@@ -55,7 +61,7 @@ std::vector<uint32_t> drop_unused_objects(Scene& scene, std::vector<Affine>& res
   std::vector<uint8_t> kept(scene.instances.size());
   for (size_t i = 0; i < kept.size(); ++i) kept[i] = shown[scene.instances[i].object];
   const std::vector<uint32_t> instance_numbers = keep_used(scene.instances, kept);
-  keep_used(residuals, kept);
+  residuals.keep(kept);
   std::erase_if(scene.animated_instances, [&](const AnimatedInstance& animated) { return !kept[animated.instance]; });
   for (AnimatedInstance& animated : scene.animated_instances) animated.instance = instance_numbers[animated.instance];
   const std::vector<uint32_t> numbers = keep_used(scene.objects, shown);

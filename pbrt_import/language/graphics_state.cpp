@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+
+#include "pbrt_import/language/transforms.h"
 
 namespace packtrace {
 
@@ -40,24 +43,48 @@ std::string_view end_keyword(BlockKind kind) {
 }
 
 void GraphicsState::concatenate(const DAffine& map) {
-  if (active_ == 3 && !animated_) {
-    transform_.start = compose(transform_.start, map);
-    transform_.end = transform_.start;
-    return;
-  }
+  linear_ = Linear::kUnknown;
   if (active_ & 1) transform_.start = compose(transform_.start, map);
-  if (active_ & 2) transform_.end = compose(transform_.end, map);
+  if (animated_ && (active_ & 2)) transform_.end = compose(transform_.end, map);
+}
+
+void GraphicsState::translate(DVec3 offset) {
+  if (animated_) return concatenate(translation(offset));
+  if (linear_ == Linear::kUnknown) {
+    // A product with the identity adds zeros of any sign to each number, which only change -0, and NaN of infinities.
+    const auto kept = [](double v) { return std::isfinite(v) && !(v == 0.0 && std::signbit(v)); };
+    linear_ = Linear::kKept;
+    for (int column = 0; column < 3; ++column)
+      for (int row = 0; row < 3; ++row)
+        if (!kept(transform_.start[column][row])) linear_ = Linear::kOther;
+  }
+  if (linear_ == Linear::kOther) return concatenate(translation(offset));
+  transform_.start[3] = transform_point(transform_.start, offset);
+}
+
+void GraphicsState::set_active(uint8_t bits) {
+  if (!animated_) { // the ends have not been kept up to date
+    transform_.end = transform_.start;
+    for (Block& block : blocks_) block.transform.end = block.transform.start;
+  }
+  active_ = bits;
+  animated_ = true;
 }
 
 void GraphicsState::set_transform(const DAffine& map) {
+  linear_ = Linear::kUnknown;
   if (active_ & 1) transform_.start = map;
   if (active_ & 2) transform_.end = map;
   if (active_ == 3) transform_.known = true;
 }
 
-void GraphicsState::set_transform(const TransformPair& pair) { transform_ = pair; }
+void GraphicsState::set_transform(const TransformPair& pair) {
+  linear_ = Linear::kUnknown;
+  transform_ = pair;
+}
 
 void GraphicsState::reset_transform() {
+  linear_ = Linear::kUnknown;
   transform_ = {};
   active_ = 3;
 }
@@ -70,6 +97,7 @@ void GraphicsState::open_block(BlockKind kind, const Place& place) {
 void GraphicsState::close_block() {
   assert(!blocks_.empty());
   const Block& block = blocks_.back();
+  linear_ = Linear::kUnknown;
   transform_ = block.transform;
   active_ = block.active;
   if (block.kind != BlockKind::kTransform) {

@@ -76,18 +76,24 @@ public:
   ScopedNames float_textures;    ///< TextureGraph numbers
   ScopedNames spectrum_textures; ///< TextureGraph numbers
 
-  const TransformPair& transform() const { return transform_; }
+  TransformPair transform() const {
+    return {transform_.start, animated_ ? transform_.end : transform_.start, transform_.known};
+  }
+  const DAffine& start_transform() const { return transform_.start; }
+  bool transform_known() const { return transform_.known; }
   bool animated() const { return animated_ && transform_.start != transform_.end; }
 
   /// Multiplies the active transforms by `map` from the right: points are mapped by `map` first.
   void concatenate(const DAffine& map);
+  /// concatenate() with a translation by a finite offset, bit for bit.
+  void translate(DVec3 offset);
   void set_transform(const DAffine& map);
   void set_transform(const TransformPair& pair);
   void reset_transform();
   /// Marks the transform as unknown, because a directive that changes it had to be ignored.
   void mark_transform_unknown() { transform_.known = false; }
   /// Selects the transforms that later directives change: bit 0 is the start, bit 1 the end.
-  void set_active(uint8_t bits) { active_ = bits, animated_ = true; }
+  void set_active(uint8_t bits);
 
   void open_block(BlockKind kind, const Place& place);
   /// Closes the innermost block and restores its state. Precondition: a block is open.
@@ -95,9 +101,13 @@ public:
   const std::vector<Block>& blocks() const { return blocks_; }
 
 private:
-  TransformPair transform_;
+  /// Whether products of the linear part with 1 and sums with 0 keep all its bits.
+  enum class Linear : uint8_t { kUnknown, kKept, kOther };
+
+  TransformPair transform_; ///< its end, and those of blocks_, only count if animated_
   uint8_t active_ = 3;
-  bool animated_ = false; ///< whether ActiveTransform was ever used
+  Linear linear_ = Linear::kUnknown; ///< of transform_.start
+  bool animated_ = false;            ///< whether ActiveTransform was ever used
   std::vector<Block> blocks_;
 };
 

@@ -71,6 +71,7 @@ public:
   const Parameter* keep();
   void drop() { parameters_.pop_back(); }
   void clear() {
+    if (parameters_.empty() && looked_up_.empty()) return;
     parameters_.clear(), looked_up_.clear(), types_ = 0;
     if (!index_.empty()) index_ = {}; // also frees its buckets
   }

@@ -45,6 +45,7 @@ NumberText<T> parse_word(std::string_view word) {
 } // namespace
 
 bool Parser::next(Directive& directive) {
+  if (next_plain(directive)) return true;
   while (true) {
     const Token& token = source_.peek();
     if (token.kind == TokenKind::kEnd) return false;
@@ -61,17 +62,7 @@ bool Parser::next(Directive& directive) {
       skip_to_directive(line);
       continue;
     }
-    reporter_.next_directive();
-    directive.kind = info->kind;
-    directive.keyword = info->keyword;
-    directive.place = source_.place();
-    directive.name_count = 0;
-    directive.damaged = false;
-    directive.parameters.clear();
-    directive.memory.release();
-    if (!directive.memory.has_budget()) directive.memory = MemoryReservation(memory_);
-    directive_ = &directive;
-    value_bytes_ = 0;
+    begin(directive, *info, source_.place());
     source_.consume();
     if (!read_arguments(*info, directive)) {
       skip_to_directive(directive.place.line);
@@ -82,6 +73,20 @@ bool Parser::next(Directive& directive) {
     const std::filesystem::path path = file_names_.resolve(include_name_, directive.place, reporter_);
     if (!path.empty()) source_.include(path, directive.place);
   }
+}
+
+void Parser::begin(Directive& directive, const DirectiveInfo& info, const Place& place) {
+  reporter_.next_directive();
+  directive.kind = info.kind;
+  directive.keyword = info.keyword;
+  directive.place = place;
+  directive.name_count = 0;
+  directive.damaged = false;
+  directive.parameters.clear();
+  if (directive.memory.bytes() > 0) directive.memory.release();
+  if (!directive.memory.has_budget()) directive.memory = MemoryReservation(memory_);
+  directive_ = &directive;
+  value_bytes_ = 0;
 }
 
 bool Parser::read_arguments(const DirectiveInfo& info, Directive& directive) {

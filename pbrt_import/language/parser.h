@@ -53,6 +53,12 @@ public:
   bool next(Directive& directive);
 
 private:
+  bool next_plain(Directive& directive);
+  bool take_plain_matrix(PlainText& text, uint32_t count, std::array<double, 16>& numbers);
+  bool take_plain_parameters(ParameterList& list);
+  bool take_plain_parameter(ParameterList& list);
+  bool take_plain_value(PlainText& text, Parameter& parameter);
+  void begin(Directive& directive, const DirectiveInfo& info, const Place& place);
   bool read_arguments(const DirectiveInfo& info, Directive& directive);
   bool read_directive_numbers(const DirectiveInfo& info, Directive& directive);
   bool read_directive_names(const DirectiveInfo& info, Directive& directive);
@@ -63,6 +69,7 @@ private:
   };
   void read_parameters(ParameterList& list);
   void read_value_of_last(ParameterList& list, bool declared);
+  void keep_last(ParameterList& list);
   bool skip_stray_word();
   void skip_stray_value(const ParameterList& list);
   bool read_declaration(std::string_view text, Parameter& parameter);
@@ -82,11 +89,14 @@ private:
   void report_unexpected(const std::string& expected, const std::string& consequence);
   /// Counts the memory of a value against the budget. Call before the value is stored.
   void count_value(uint64_t bytes) {
-    constexpr uint64_t kFree = 1u << 20; // enough for most directives
     value_bytes_ += bytes;
-    if (value_bytes_ > kFree && value_bytes_ > directive_->memory.bytes()) reserve_values();
+    if (value_bytes_ > kFreeBytes && value_bytes_ > directive_->memory.bytes()) reserve_values();
   }
   void reserve_values();
+
+  static constexpr uint64_t kFreeBytes = 1u << 20; ///< not counted: enough for most directives
+  /// Of a parameter itself: the list doubles its capacity as it grows.
+  static constexpr uint64_t kParameterBytes = 2 * sizeof(Parameter);
 
   SourceStack& source_;
   FileNames& file_names_;

@@ -64,8 +64,8 @@ size_t components(ParameterType type) {
 
 /// Reads all parameters up to the next directive. Malformed input costs the parameter that it belongs to and no other.
 void Parser::read_parameters(ParameterList& list) {
-  constexpr uint64_t kParameterBytes = 2 * sizeof(Parameter); // the list doubles its capacity as it grows
   while (true) {
+    if (!misread_declaration_ && take_plain_parameters(list)) return;
     if (misread_declaration_) {
       count_value(kParameterBytes + misread_declaration_->text.size());
       Parameter& parameter = list.append();
@@ -96,6 +96,10 @@ void Parser::read_parameters(ParameterList& list) {
 void Parser::read_value_of_last(ParameterList& list, bool declared) {
   if (!declared) skip_value();
   if (!declared || !read_values(list.last())) return list.drop();
+  keep_last(list);
+}
+
+void Parser::keep_last(ParameterList& list) {
   cut_excess(list.last());
   if (const Parameter* const again = list.keep())
     reporter_.warning(again->place, "parameter " + describe(*again) + " is given again; the last one counts");

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -38,14 +40,41 @@ DAffine moved(DAffine map, DVec3 by) {
   return map;
 }
 
+using AddResidual = std::function<void(size_t instance, DAffine& map)>;
+
+/// What bounds the places of all instances: their translations, and how far a point of one is from its translation.
+struct Spread {
+  Bounds translations;
+  double radius = 0.0; ///< on each axis
+};
+
+/// @param object_radius largest coordinate, by absolute value, of a point of an object in its own space
+Spread spread_of(std::span<const Instance> instances, double object_radius) {
+  Vec3 lo(std::numeric_limits<float>::infinity()), hi = -lo, largest(0.0f);
+  for (const Instance& instance : instances) {
+    const Affine& map = instance.world_from_object;
+    lo = glm::min(lo, map[3]), hi = glm::max(hi, map[3]);
+    largest = glm::max(largest, glm::max(glm::max(glm::abs(map[0]), glm::abs(map[1])), glm::abs(map[2])));
+  }
+  const double factor = double{std::max({largest.x, largest.y, largest.z})};
+  return {{DVec3(lo), DVec3(hi)}, 3.0 * factor * object_radius};
+}
+
+double largest_coordinate(const Bounds& box) {
+  const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  return std::max({far.x, far.y, far.z});
+}
+
 class Mover {
 public:
-  Mover(Scene& scene, std::span<const Affine> residuals) : scene_(scene), residuals_(residuals) {
+  Mover(Scene& scene, const AddResidual& add_residual) : scene_(scene), add_residual_(add_residual) {
+    meshes_.reserve(scene.meshes.size());
     for (const Mesh& mesh : scene.meshes) meshes_.push_back(bounds_of(mesh.positions));
   }
 
   void run() {
     objects_moved_ = move_objects();
+    if (!objects_moved_ && surely_near()) return;
     Bounds world = bounds_of_shapes(scene_.shapes, meshes_);
     for (size_t i = 0; i < scene_.instances.size(); ++i)
       world.extend(transform_bounds(map(i), object_boxes_[scene_.instances[i].object]));
@@ -57,12 +86,38 @@ public:
   }
 
 private:
+  /// True only if the world need not be moved: told from the instances' translations and how far they reach at most,
+  /// because the boxes of a million instances take longer than reading them.
+  bool surely_near() const {
+    double object_radius = 0.0;
+    for (const Bounds& box : object_boxes_) {
+      if (box.empty()) return false;
+      object_radius = std::max(object_radius, largest_coordinate(box));
+    }
+    Bounds shapes;
+    for (const Shape& shape : scene_.shapes) {
+      const DAffine& map = shape.parent_from_mesh;
+      const Bounds& box = meshes_[shape.mesh];
+      const bool moves_only = glm::dmat3(map) == glm::dmat3(1.0); // then corners need no products
+      shapes.extend(moves_only ? Bounds{box.lo + map[3], box.hi + map[3]} : transform_bounds(map, box));
+    }
+    double distance = shapes.empty() ? 0.0 : largest_coordinate(shapes), diagonal = shapes.diagonal();
+    if (!scene_.instances.empty()) {
+      const Spread spread = spread_of(scene_.instances, object_radius);
+      distance = std::max(distance, largest_coordinate(spread.translations) + spread.radius);
+      const DVec3 surely = glm::max(spread.translations.extent() - DVec3(2.0 * spread.radius), DVec3(0.0));
+      diagonal = std::max(diagonal, glm::length(surely));
+    }
+    constexpr double kMargin = 0.75; // for all rounding
+    return std::isfinite(distance) && distance < kMargin * kFarWorld * diagonal;
+  }
+
   /// world_from_object of an instance in doubles, after its object's shapes have moved. Computed when it is needed,
   /// because an array of all maps takes more memory than the instances.
   DAffine map(size_t i) const {
     const Instance& instance = scene_.instances[i];
     DAffine map(instance.world_from_object);
-    if (!residuals_.empty()) map += DAffine(residuals_[i]);
+    if (add_residual_) add_residual_(i, map);
     if (objects_moved_) map[3] = transform_point(map, zeros_[instance.object]);
     return map;
   }
@@ -131,7 +186,7 @@ private:
   }
 
   Scene& scene_;
-  std::span<const Affine> residuals_; ///< as in move_far_world()
+  const AddResidual& add_residual_; ///< as in move_far_world()
   std::vector<Bounds> meshes_, object_boxes_;
   std::vector<DVec3> zeros_;   ///< by object: the point that becomes its zero
   bool objects_moved_ = false; ///< whether a zero differs from 0; then map() applies them
@@ -140,6 +195,6 @@ private:
 
 } // namespace
 
-void move_far_world(Scene& scene, std::span<const Affine> residuals) { Mover(scene, residuals).run(); }
+void move_far_world(Scene& scene, const AddResidual& add_residual) { Mover(scene, add_residual).run(); }
 
 } // namespace packtrace

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <span>
+#include <cstddef>
+#include <functional>
 
 #include "pbrt_import/scene/scene.h"
 
@@ -13,8 +14,7 @@ namespace packtrace {
 ///
 /// All transforms must be those of the source in doubles. Coordinates of meshes are floats already, so their rounding
 /// errors remain.
-/// @param residuals by instance: transform in doubles minus world_from_object, its rounding to floats; empty if all are
-/// 0
-void move_far_world(Scene& scene, std::span<const Affine> residuals = {});
+/// @param add_residual adds to world_from_object of an instance what its rounding to floats lost; empty: nothing
+void move_far_world(Scene& scene, const std::function<void(size_t instance, DAffine& map)>& add_residual = {});
 
 } // namespace packtrace

@@ -1,6 +1,7 @@
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <string_view>
@@ -166,10 +167,14 @@ void normals_from_faces(Mesh& mesh, const std::vector<uint8_t>& marked) {
   }
 }
 
+bool is_unit(Vec3 n) {
+  constexpr float kUnitTolerance = 4e-7f; // for the squared length: a few roundings of a float unit vector
+  return std::abs(glm::dot(n, n) - 1.0f) <= kUnitTolerance;
+}
+
 /// Normalises a normal; returns false and leaves it unchanged if its length is zero.
 bool make_unit(Vec3& n) {
-  constexpr float kUnitTolerance = 4e-7f; // for the squared length: a few roundings of a float unit vector
-  if (std::abs(glm::dot(n, n) - 1.0f) <= kUnitTolerance) return true;
+  if (is_unit(n)) return true;
   const DVec3 wide(n);
   const double length = glm::length(wide); // cannot overflow: the components are floats
   if (!(length > 0.0 && std::isfinite(length))) return false;
@@ -202,6 +207,27 @@ void check_count(std::vector<T>& attribute, size_t vertex_count, std::string_vie
 }
 
 } // namespace
+
+bool is_clean(const Mesh& mesh) {
+  constexpr size_t kMaxVertices = 512;
+  const std::vector<Vec3>& p = mesh.positions;
+  const auto fits = [&](size_t count) { return count == 0 || count == p.size(); };
+  if (p.size() > kMaxVertices || mesh.triangles.empty() || !fits(mesh.normals.size()) || !fits(mesh.uvs.size()))
+    return false;
+  std::array<uint64_t, kMaxVertices / 64> used{};
+  for (const Triangle& t : mesh.triangles) {
+    if (t.x >= p.size() || t.y >= p.size() || t.z >= p.size()) return false;
+    // Equal indices have equal positions. NaN differ, but are not finite.
+    if (p[t.x] == p[t.y] || p[t.y] == p[t.z] || p[t.z] == p[t.x]) return false;
+    if (t.x == t.y || t.y == t.z || t.z == t.x) return false;
+    for (const uint32_t vertex : {t.x, t.y, t.z}) used[vertex / 64] |= uint64_t{1} << vertex % 64;
+  }
+  size_t used_count = 0;
+  for (const uint64_t word : used) used_count += static_cast<size_t>(std::popcount(word));
+  const auto finite_uv = [](Vec2 uv) { return std::isfinite(uv.x) && std::isfinite(uv.y); };
+  return used_count == p.size() && all_finite(p) && std::all_of(mesh.normals.begin(), mesh.normals.end(), is_unit) &&
+         std::all_of(mesh.uvs.begin(), mesh.uvs.end(), finite_uv);
+}
 
 uint64_t clean_up_mesh(Mesh& mesh, const ReportFn& report) {
   check_count(mesh.normals, mesh.positions.size(), "normals", report);

@@ -7,6 +7,10 @@
 
 namespace packtrace {
 
+/// True only if clean_up_mesh() would neither change nor report anything and leave triangles. Told without allocations,
+/// for small meshes only, since most small ones are clean.
+bool is_clean(const Mesh& mesh);
+
 /// Establishes the contract of Mesh. Drops triangles with an index out of range, a repeated index or a non-finite
 /// vertex, then unreferenced vertices, without changing the order of the rest. Drops normals or uvs whose count differs
 /// from that of the positions. Normalises normals, and recomputes zero or non-finite ones from the surrounding faces.

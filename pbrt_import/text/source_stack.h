@@ -45,6 +45,21 @@ public:
     return !gave_up_ && files_open_.back().tokenizer.read_bare_number(value);
   }
 
+  /// The text behind the last token, to be read ahead; none if a token was peeked and not consumed.
+  PlainText plain_text() const { return peeked_ || gave_up_ ? PlainText() : files_open_.back().tokenizer.plain_text(); }
+  /// Consumes all that was read from plain_text(), after which no other function was called.
+  void accept(const PlainText& text) {
+    files_open_.back().tokenizer.accept(text);
+    token_ = {TokenKind::kWord, {}, text.token_line(), text.token_column()};
+  }
+  /// Tokenizer::take_array() of the current file.
+  template <class T>
+  NumberSpans<T> take_array(PlainText& text) {
+    return files_open_.back().tokenizer.take_array<T>(text);
+  }
+  /// Place::file of the current file.
+  uint32_t file() const { return files_open_.back().number; }
+
   /// Continues with the start of another file. If the file cannot be included, this is reported and reading continues
   /// after the Include.
   /// @param place position of the Include directive

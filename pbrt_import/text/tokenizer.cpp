@@ -1,81 +1,12 @@
 #include "pbrt_import/text/tokenizer.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <cstring>
 
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/printable.h"
-#include "pbrt_import/text/number.h"
+#include "pbrt_import/text/scan_tokens.h"
 
 namespace packtrace {
-namespace {
-
-constexpr bool is_bad_byte(char c) {
-  const auto byte = static_cast<unsigned char>(c);
-  return (byte < 0x20 && !is_space(c) && c != '\v' && c != '\f') || byte == 0x7f || byte == 0xff;
-}
-
-/// Bytes that do not belong in strings. Names are bytes in any encoding that contains ASCII, and 0xFF is a letter in
-/// many.
-constexpr bool is_bad_string_byte(char c) { return is_bad_byte(c) && static_cast<unsigned char>(c) != 0xff; }
-
-/// Table of a predicate over all byte values.
-template <class Predicate>
-constexpr std::array<bool, 256> table_of(Predicate predicate) {
-  std::array<bool, 256> table{};
-  for (size_t i = 0; i < table.size(); ++i) table[i] = predicate(static_cast<char>(i));
-  return table;
-}
-
-/// Bytes that continue a word, and bytes of a string that need no special treatment. Neither table contains the zero
-/// bytes that follow a window.
-constexpr std::array<bool, 256> kWordBytes = table_of([](char c) { return !ends_word(c) && !is_bad_byte(c); });
-constexpr std::array<bool, 256> kPlainStringBytes =
-    table_of([](char c) { return c != '"' && c != '\\' && c != '\n' && c != '\r' && !is_bad_string_byte(c); });
-
-constexpr uint64_t kOnes = 0x0101010101010101u, kHighBits = 0x80 * kOnes;
-
-// SWAR tests of eight bytes: bit 7 is set for bytes below a bound, or equal to a character. The result is exact up to
-// the first such byte; later bytes, and bytes from 0x80 on, may be set wrongly.
-constexpr uint64_t bytes_below(uint64_t word, uint64_t bound) { return word - bound * kOnes; }
-constexpr uint64_t bytes_equal(uint64_t word, char c) { return (word ^ static_cast<unsigned char>(c) * kOnes) - kOnes; }
-constexpr uint64_t bytes_from_0x7f(uint64_t word) { return word | (word + kOnes); }
-
-/// Number of leading bytes for which the table is true.
-/// @param special_bytes takes eight bytes; sets bit 7 of the first byte for which the table may be false
-template <class SpecialBytes>
-size_t count_while(const char* text, const std::array<bool, 256>& bytes, SpecialBytes special_bytes) {
-  static_assert(kScannerReach >= sizeof(uint64_t) && std::endian::native == std::endian::little);
-  const char* p = text;
-  while (true) {
-    uint64_t word;
-    std::memcpy(&word, p, sizeof word);
-    const uint64_t special = special_bytes(word) & kHighBits;
-    if (special == 0) {
-      p += sizeof word;
-      continue;
-    }
-    p += std::countr_zero(special) / 8;
-    if (!bytes[static_cast<unsigned char>(*p)]) return static_cast<size_t>(p - text);
-    ++p;
-  }
-}
-
-size_t count_word_bytes(const char* text) {
-  return count_while(text, kWordBytes, [](uint64_t word) {
-    return bytes_below(word, '"' + 1) | bytes_equal(word, '[') | bytes_equal(word, ']') | bytes_from_0x7f(word);
-  });
-}
-
-size_t count_plain_string_bytes(const char* text) {
-  return count_while(text, kPlainStringBytes, [](uint64_t word) {
-    return bytes_below(word, ' ') | bytes_equal(word, '"') | bytes_equal(word, '\\') | bytes_from_0x7f(word);
-  });
-}
-
-} // namespace
 
 Tokenizer::Tokenizer(InputFile file, size_t window_bytes)
     : blocks_(std::make_unique<TextBlocks>(std::move(file), window_bytes)) {
@@ -186,7 +117,7 @@ Token Tokenizer::next() {
   if (!found) return make(TokenKind::kEnd, position_, position_);
   const char c = window_[position_];
   if (c == '"') return read_string();
-  if (kWordBytes[static_cast<unsigned char>(c)]) return read_word();
+  if (is_word_byte(c)) return read_word();
   const TokenKind kind = c == '[' ? TokenKind::kOpen : c == ']' ? TokenKind::kClose : TokenKind::kBadByte;
   ++position_;
   return make(kind, position_ - 1, position_);
@@ -216,7 +147,7 @@ Token Tokenizer::read_string() {
     const char c = window_[position_ + length];
     if (c == '"') return end(TokenKind::kString, position_ + length, position_ + length + 1);
     if (c == '\n' || c == '\r' || bad_bytes == kMaxStringBadBytes) break;
-    if (is_bad_string_byte(c) && bad_bytes++ == 0) bad_at = length;
+    if (detail::is_bad_string_byte(c) && bad_bytes++ == 0) bad_at = length;
     if (c == '\\') {
       if (position_ + length + 1 >= size_) refill();
       const char escaped = window_[position_ + length + 1];

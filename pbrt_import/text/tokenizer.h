@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pbrt_import/text/number.h"
+#include "pbrt_import/text/plain_text.h"
 #include "pbrt_import/text/text_blocks.h"
 
 namespace packtrace {
@@ -34,6 +35,14 @@ struct Token {
   uint32_t column = 0;   ///< in bytes, from 1
 };
 
+/// Numbers of one type, or integers; the other span is empty.
+template <class T>
+struct NumberSpans {
+  std::span<const T> own;
+  std::span<const int32_t> integers;
+  size_t size() const { return own.size() + integers.size(); }
+};
+
 /// Splits a pbrt-v3 file into tokens in one pass over a window of its text, which is a block, or a copy of several
 /// blocks if a token spans them. Lines end with LF, CR LF or CR; a UTF-8 byte order mark is skipped.
 class Tokenizer {
@@ -57,6 +66,23 @@ public:
   template <class T>
   bool read_bare_number(T& value);
 
+  /// The text from the current position, to be read ahead of the tokenizer; none while a long token is joined.
+  PlainText plain_text() const {
+    if (window_ != block_->text.data()) return {};
+    return {window_, size_, position_, window_offset_, line_, line_start_};
+  }
+  /// Moves past all that was read from plain_text(). There must have been no other call since.
+  void accept(const PlainText& text) {
+    position_ = static_cast<size_t>(text.offset() - window_offset_);
+    line_ = text.line();
+    line_start_ = text.line_start();
+  }
+  /// Reads the numbers of an array that were converted ahead, if they all were, are of type T and "]" follows them.
+  /// @param text at the position after "[", behind what plain_text() returned; moves past the "]"
+  /// @return all the numbers: of type T, or of int32_t; both empty if the array has another form
+  template <class T>
+  NumberSpans<T> take_array(PlainText& text);
+
   /// Content bytes consumed so far.
   uint64_t consumed_bytes() const { return window_offset_ + position_; }
   const InputFile& file() const { return blocks_->file(); }
@@ -68,6 +94,9 @@ private:
   /// The run of numbers that starts at the current position and is convertible to T; null if there is none.
   template <class T>
   const NumberRun* find_run();
+  /// The run that starts at an offset, in the last block.
+  template <class T>
+  const NumberRun* find_run_at(uint64_t offset);
   void skip(const NumberRun& run);
   bool skip_space_and_comments();
   void skip_comment();
@@ -137,9 +166,30 @@ bool Tokenizer::read_bare_number(T& value) {
 }
 
 template <class T>
+NumberSpans<T> Tokenizer::take_array(PlainText& text) {
+  using Kind = NumberRun::Kind;
+  const NumberRun* const run = find_run_at<T>(text.offset());
+  if (!run || run->end >= window_offset_ + size_) return {};
+  PlainText after = text;
+  after.move_to(run->end, text.line() + run->line_ends, run->line_ends > 0 ? run->line_start : text.line_start());
+  if (!after.take(']')) return {};
+  text = after;
+  const auto part = [&](const auto& numbers) { return std::span(numbers).subspan(run->first, run->count); };
+  if (run->kind == Kind::kInteger) return {{}, part(block_->integers)};
+  if constexpr (std::is_same_v<T, float>) return {part(block_->floats), {}};
+  if constexpr (std::is_same_v<T, double>) return {part(block_->doubles), {}};
+  return {};
+}
+
+template <class T>
 const NumberRun* Tokenizer::find_run() {
   const uint64_t offset = consumed_bytes();
   if (offset >= block_->offset + blocks_->block_bytes() && !refill()) return nullptr;
+  return find_run_at<T>(offset);
+}
+
+template <class T>
+const NumberRun* Tokenizer::find_run_at(uint64_t offset) {
   while (run_ < block_->runs.size() && block_->runs[run_].begin < offset) ++run_;
   if (run_ == block_->runs.size() || block_->runs[run_].begin != offset) return nullptr;
   const NumberRun& run = block_->runs[run_];

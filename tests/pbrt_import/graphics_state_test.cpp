@@ -1,5 +1,7 @@
 #include "pbrt_import/language/graphics_state.h"
 
+#include <cstring>
+#include <limits>
 #include <numbers>
 
 #include <gtest/gtest.h>
@@ -143,6 +145,48 @@ TEST(GraphicsState, MisspelledNamesFindTheirNeighbour) {
   EXPECT_EQ(names.closest("RoofTile"), "RoofTiles");
   EXPECT_EQ(names.closest("chrome"), "Chrome");
   EXPECT_EQ(names.closest("Gold"), "");
+}
+
+/// The state's transform after Transform(map) and a translation, either by its short way or as a product.
+DAffine moved(const DAffine& map, DVec3 offset, bool as_product) {
+  GraphicsState state;
+  state.set_transform(map);
+  if (as_product)
+    state.concatenate(translation(offset));
+  else
+    state.translate(offset);
+  return state.transform().end;
+}
+
+TEST(GraphicsState, TranslationsEqualProductsBitForBit) {
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const double a : {1.0, -0.0, 0.0, -3.5, 1e-310, inf, std::nan("")})
+    for (const double b : {0.0, -0.0, -1.0, 2e200})
+      for (const DVec3 offset : {DVec3(0.1, -2, 3e9), DVec3(-0.0, 0.0, -0.0), DVec3(1e300, 1e300, -1e300)}) {
+        const DAffine map(DVec3(a, b, -b), DVec3(b, a, b), DVec3(-b, b, -a), DVec3(b, 5, -a));
+        const DAffine fast = moved(map, offset, false), product = moved(map, offset, true);
+        for (int column = 0; column < 4; ++column)
+          for (int row = 0; row < 3; ++row) {
+            const double x = fast[column][row], y = product[column][row];
+            EXPECT_TRUE(std::memcmp(&x, &y, sizeof x) == 0 || (std::isnan(x) && std::isnan(y)))
+                << a << " " << b << " column " << column << " row " << row << ": " << x << ", " << y;
+          }
+      }
+}
+
+TEST(GraphicsState, ActiveTransformStartsFromTheTransformsOfAllBlocks) {
+  GraphicsState state;
+  state.translate({1, 0, 0});
+  state.open_block(BlockKind::kAttribute, {});
+  state.translate({0, 2, 0});
+  state.set_active(1);
+  state.translate({0, 0, 3});
+  EXPECT_EQ(state.transform().start[3], DVec3(1, 2, 3));
+  EXPECT_EQ(state.transform().end[3], DVec3(1, 2, 0));
+  state.close_block();
+  EXPECT_EQ(state.transform().start[3], DVec3(1, 0, 0));
+  EXPECT_EQ(state.transform().end[3], DVec3(1, 0, 0));
+  EXPECT_FALSE(state.animated());
 }
 
 } // namespace

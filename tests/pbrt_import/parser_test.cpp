@@ -1,6 +1,7 @@
 #include "pbrt_import/language/parser.h"
 
 #include <memory>
+#include <span>
 
 #include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/scene_folder.h"
@@ -279,6 +280,150 @@ TEST_F(ParserTest, EveryTruncationIsSurvived) {
                            "Texture \"t\" \"float\" \"constant\" \"bool b\" \"true\" \"integer i\" 5\n";
   const size_t whole = parse(text).size();
   for (size_t size = 0; size < text.size(); ++size) EXPECT_LE(parse(text.substr(0, size)).size(), whole);
+}
+
+/// All that a parse found, with the bits of its numbers. Positions are left out.
+std::string listing(const auto& directives) {
+  std::string all;
+  const auto add = [&](const auto& values) {
+    for (const auto& value : values) all.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  for (const auto& directive : directives) {
+    all += "\n" + std::to_string(static_cast<int>(directive.kind)) + (directive.damaged ? "?" : ":");
+    for (const std::string& name : directive.names) all += name + ",";
+    if (directive.kind == K::kTranslate && !directive.damaged) add(std::span(directive.numbers).first(3));
+    if (directive.kind == K::kConcatTransform && !directive.damaged) add(directive.numbers);
+    for (const Parameter& parameter : directive.parameters.all()) {
+      all += describe(parameter) + "=";
+      add(std::span<const float>(parameter.floats));
+      add(std::span<const int32_t>(parameter.integers));
+      for (const std::string& string : parameter.strings) all += string + ",";
+    }
+  }
+  return all;
+}
+
+TEST_F(ParserTest, CommentsBetweenTokensChangeNothing) {
+  // Comments lead to the tokenizer; without them, most of this takes the short way.
+  const std::vector<std::string> tokens = {"Translate",
+                                           "1",
+                                           "-0",
+                                           "2.5e3",
+                                           "Translate",
+                                           "1",
+                                           "2",
+                                           "Translate",
+                                           "1",
+                                           "2",
+                                           "3",
+                                           "4",
+                                           "ObjectInstance",
+                                           "\"a b\"",
+                                           "ConcatTransform",
+                                           "[",
+                                           "1",
+                                           "0",
+                                           "0",
+                                           "0",
+                                           "0",
+                                           "1",
+                                           "0",
+                                           "-0",
+                                           "0",
+                                           "0",
+                                           "1",
+                                           "0",
+                                           "7",
+                                           "8",
+                                           "9.5",
+                                           "1",
+                                           "]",
+                                           "Translate",
+                                           "1",
+                                           "1",
+                                           "nan",
+                                           "Scale",
+                                           "1",
+                                           "2",
+                                           "3",
+                                           "NamedMaterial",
+                                           "\"m\"",
+                                           "Shape",
+                                           "\"trianglemesh\"",
+                                           "\"integer indices\"",
+                                           "[",
+                                           "0",
+                                           "1",
+                                           "2",
+                                           "]",
+                                           "\"point P\"",
+                                           "[",
+                                           "0",
+                                           "1",
+                                           "-0",
+                                           "2.5",
+                                           "3",
+                                           "4",
+                                           "5",
+                                           "]",
+                                           "\"float x\"",
+                                           "3",
+                                           "\"integer n\"",
+                                           "-7",
+                                           "\"string s\"",
+                                           "\"float y\"",
+                                           "2",
+                                           "\"string s\"",
+                                           "\"v\"",
+                                           "\"string s\"",
+                                           "[",
+                                           "\"w\"",
+                                           "]",
+                                           "\"bool b\"",
+                                           "true",
+                                           "\"rgb  c\"",
+                                           "[",
+                                           "1",
+                                           "2",
+                                           "3",
+                                           "]",
+                                           "\"float\"",
+                                           "[",
+                                           "1",
+                                           "]",
+                                           "\"texture t\"",
+                                           "\"u\"",
+                                           "Texture",
+                                           "\"n\"",
+                                           "\"spectrum\"",
+                                           "\"constant\"",
+                                           "\"rgb value\"",
+                                           "[",
+                                           "1",
+                                           "]",
+                                           "Bogus",
+                                           "Translate",
+                                           "1",
+                                           "2",
+                                           "\"x\"",
+                                           "ObjectInstance",
+                                           "7",
+                                           "AttributeEnd",
+                                           "MediumInterface",
+                                           "\"m\"",
+                                           "Translate",
+                                           "0",
+                                           "0",
+                                           "x",
+                                           "WorldEnd"};
+  const auto joined = [&](std::string_view gap) {
+    std::string text;
+    for (const std::string& token : tokens) text.append(token).append(gap);
+    return text;
+  };
+  const std::string expected = listing(parse(joined(" #\n")));
+  for (const std::string_view gap : {" ", "\n", "\r\n", "\t \n ", "\r"})
+    EXPECT_EQ(listing(parse(joined(gap))), expected);
 }
 
 } // namespace
