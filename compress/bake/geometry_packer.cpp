@@ -52,7 +52,8 @@ PackedGeometry GeometryPacker::pack(size_t index, const SharedBorders* borders) 
   Draft draft = pack_with(index, needs);
   if (borders != nullptr && !plan_.geometries[index].deforms &&
       draft.quantized.triangles.size() >= config_.lod_min_triangles) {
-    LodLimits limits{config_.lod_levels + 1, {}};
+    // An encoding or error that the user asks for holds for all levels.
+    LodLimits limits{config_.lod_levels + 1, {}, !config_.normals && !config_.normal_error_degrees};
     if (plan_.geometries[index].world_space) limits.locked = borders->locks(draft.quantized);
     draft.packed.lod = find_or_build_lod(draft, limits);
   }
@@ -71,7 +72,7 @@ EncodedLod GeometryPacker::find_or_build_lod(Draft& draft, const LodLimits& limi
       return std::move(*found);
     }
   ClusterLod lod = build_cluster_lod(geometry, clusters, progress_, limits);
-  EncodedLod encoded = encode_lod(geometry, lod);
+  EncodedLod encoded = encode_lod(geometry, lod, limits.coarser_normals);
   // If another geometry failed or the bake was cancelled, inner loops return early with incomplete levels.
   if (store_ && !tbb::is_current_task_group_canceling()) store_->keep(key, encoded);
   return encoded;

@@ -100,7 +100,8 @@ TEST_F(LodValidation, GeometriesOfLevelsAreChecked) {
   EXPECT_EQ(geometry(3, offsetof(Geometry, step_mantissa), 7), "lod level 1: geometry is not like its base");
   EXPECT_EQ(geometry(3, offsetof(Geometry, slot_count), 2), "lod level 1: geometry is not like its base");
   EXPECT_EQ(geometry(3, offsetof(Geometry, origin), 12345), "lod level 1: geometry is not like its base");
-  EXPECT_EQ(geometry(3, offsetof(Geometry, normal_encoding), 0), "lod level 1: geometry is not like its base");
+  EXPECT_EQ(geometry(3, offsetof(Geometry, uv_encoding), 1), "lod level 1: geometry is not like its base");
+  EXPECT_EQ(geometry(3, offsetof(Geometry, normal_encoding), 9), "geometry 3: normal encoding");
   EXPECT_EQ(after(baked::kInstances, offsetof(baked::InstanceRecord, geometry), 3), "instance 0: geometry");
 }
 

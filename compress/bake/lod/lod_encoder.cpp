@@ -5,6 +5,9 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <utility>
+
+#include "compress/bake/lod/level_normals.h"
 
 namespace packtrace {
 namespace {
@@ -112,15 +115,33 @@ std::vector<uint32_t> order_clusters(const QuantizedGeometry& geometry, const Cl
   return order;
 }
 
+/// Encodes the clusters of a level above 0, with coarser normals if its errors allow them.
+/// @param errors per cluster, in lattice steps
+void encode_level(QuantizedGeometry& geometry, GeometryClusters& clusters, std::span<const double> errors,
+                  bool coarser_normals, EncodedLod::Level& to) {
+  CoarseNormals normals{geometry.normal_encoding, {}, 0.0, 0.0};
+  if (coarser_normals) normals = coarsen_normals(level_normal_limit(geometry, clusters, errors), geometry, clusters);
+  to.normal_encoding = normals.encoding;
+  to.max_normal_error = static_cast<float>(normals.max_error_degrees);
+  to.mean_normal_error = static_cast<float>(normals.mean_error_degrees);
+  const bool coarser = !normals.vertices.empty();
+  if (coarser) std::swap(geometry.vertices, normals.vertices);
+  std::swap(geometry.normal_encoding, normals.encoding);
+  to.encoded = encode_geometry(geometry, clusters);
+  std::swap(geometry.normal_encoding, normals.encoding);
+  if (coarser) std::swap(geometry.vertices, normals.vertices);
+}
+
 } // namespace
 
-EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod) {
+EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod, bool coarser_normals) {
   EncodedLod out;
   if (lod.level_count < 2 || !GroupEncoder(geometry, lod).run(out.groups)) return {};
   geometry.positions = std::move(lod.positions);
   geometry.vertices = std::move(lod.vertices);
   GeometryClusters level_clusters;
   level_clusters.triangles = std::move(lod.triangles);
+  std::vector<double> errors; // of the level's clusters
   out.levels.resize(lod.level_count);
   for (const baked::LodGroupRecord& group : out.groups) ++out.levels[group.level].group_count;
   uint64_t terminal = 0;
@@ -129,21 +150,21 @@ EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod) {
     while (end < lod.clusters.size() && lod.clusters[end].level == level) ++end;
     const std::vector<uint32_t> order =
         level == 0 ? std::vector<uint32_t>{} : order_clusters(geometry, lod, begin, end);
-    level_clusters.clusters.clear();
+    level_clusters.clusters.clear(), errors.clear();
     EncodedLod::Level& to = out.levels[level];
     to.triangles = terminal;
     to.error = error;
     for (uint32_t i = begin; i < end; ++i) {
       const LodCluster& c = lod.clusters[level == 0 ? i : order[i - begin]]; // level 0 keeps its stored order
       out.links.push_back({c.group, c.generating_group});
-      if (level > 0) level_clusters.clusters.push_back(c.range);
+      if (level > 0) level_clusters.clusters.push_back(c.range), errors.push_back(lod.groups[c.generating_group].error);
       to.triangles += c.range.triangle_count;
       if (lod.groups[c.group].terminal)
         terminal += c.range.triangle_count;
       else
         error = std::max(error, out.groups[c.group].error);
     }
-    if (level > 0) to.encoded = encode_geometry(geometry, level_clusters);
+    if (level > 0) encode_level(geometry, level_clusters, errors, coarser_normals, to);
   }
   return out;
 }

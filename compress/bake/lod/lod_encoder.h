@@ -15,7 +15,10 @@ struct EncodedLod {
     EncodedGeometry encoded; ///< empty at level 0, which is the geometry itself
     uint64_t triangles = 0;  ///< in the discrete level
     uint32_t group_count = 0;
-    float error = 0.0f; ///< of the discrete level, in object units
+    float error = 0.0f;                                       ///< of the discrete level, in object units
+    NormalEncoding normal_encoding = NormalEncoding::kAxis24; ///< from level 1 on
+    /// Angles to the normals in the encoding of level 0, in degrees.
+    float max_normal_error = 0.0f, mean_normal_error = 0.0f;
   };
   std::vector<Level> levels;                 ///< empty, or at least two
   std::vector<baked::LodGroupRecord> groups; ///< level by level
@@ -28,6 +31,7 @@ struct EncodedLod {
 /// there is only one level, or if a sphere or an error exceeds the range of float.
 /// @param geometry the geometry that `lod` was built from; receives the levels' positions and vertices
 /// @param lod is consumed
-EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod);
+/// @param coarser_normals levels may have normals of fewer bits (level_normal_limit())
+EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod, bool coarser_normals = true);
 
 } // namespace packtrace

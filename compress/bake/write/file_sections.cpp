@@ -1,5 +1,6 @@
 #include "compress/bake/write/file_sections.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -133,6 +134,10 @@ void FileSections::add_lod(uint32_t base, const EncodedLod& lod) {
       baked::GeometryRecord record = geometries_[base];
       record.flags |= baked::kLodLevel;
       record.name = {};
+      record.normal_encoding = static_cast<uint32_t>(level.normal_encoding);
+      record.max_normal_error_degrees = std::min(record.max_normal_error_degrees + level.max_normal_error, 180.0f);
+      record.mean_normal_error_degrees =
+          std::min(record.mean_normal_error_degrees + level.mean_normal_error, record.max_normal_error_degrees);
       append(record, level.encoded);
     }
     lod_levels_.push_back(

@@ -21,7 +21,7 @@ namespace packtrace {
 namespace {
 
 /// Increment with every change to what the builder or encoder produces for the same geometry.
-constexpr uint32_t kRevision = 8;
+constexpr uint32_t kRevision = 9;
 constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 'L', 'O', 'D', '\n', 0};
 constexpr const char* kExtension = ".ptklod";
 
@@ -47,10 +47,10 @@ struct StoredLevel {
   uint32_t cluster_count, group_count, triangle_count, vertex_count;
   std::array<uint32_t, 8> class_clusters;
   std::array<float, 3> bounds_lo, bounds_hi;
-  float error;
-  uint32_t reserved;
+  float error, max_normal_error, mean_normal_error;
+  uint32_t normal_encoding;
 };
-static_assert(sizeof(StoredLevel) == 128 && std::is_trivially_copyable_v<StoredLevel>);
+static_assert(sizeof(StoredLevel) == 136 && std::is_trivially_copyable_v<StoredLevel>);
 
 constexpr std::array<uint32_t, kPartCount> kRecordBytes = {sizeof(StoredLevel), sizeof(baked::ClusterRecord), 1,
                                                            sizeof(baked::LodGroupRecord), sizeof(baked::LodLinkRecord)};
@@ -88,7 +88,9 @@ StoredLevel stored(const EncodedLod::Level& level) {
           {e.bounds_lo.x, e.bounds_lo.y, e.bounds_lo.z},
           {e.bounds_hi.x, e.bounds_hi.y, e.bounds_hi.z},
           level.error,
-          0};
+          level.max_normal_error,
+          level.mean_normal_error,
+          static_cast<uint32_t>(level.normal_encoding)};
 }
 
 /// Copies the records of a section. Returns false if it is not inside the file or has the wrong record size.
@@ -101,6 +103,8 @@ bool read_part(std::span<const std::byte> bytes, const baked::SectionRecord& par
   if (!out.empty()) std::memcpy(out.data(), bytes.data() + part.offset, static_cast<size_t>(part.bytes));
   return true;
 }
+
+bool is_angle(float degrees) { return degrees >= 0.0f && degrees <= 180.0f; }
 
 std::optional<EncodedLod> decode(std::span<const std::byte> bytes, const LodKey& key) {
   StoreHeader header;
@@ -124,7 +128,8 @@ std::optional<EncodedLod> decode(std::span<const std::byte> bytes, const LodKey&
   size_t cluster = 0, byte = 0;
   for (const StoredLevel& level : levels) {
     if (level.cluster_count > clusters.size() - cluster || level.payload_bytes > payload.size() - byte ||
-        level.reserved != 0)
+        level.normal_encoding >= kNormalFormats.size() || !is_angle(level.max_normal_error) ||
+        !is_angle(level.mean_normal_error))
       return std::nullopt;
     EncodedGeometry e;
     const auto first = clusters.begin() + static_cast<std::ptrdiff_t>(cluster);
@@ -137,7 +142,9 @@ std::optional<EncodedLod> decode(std::span<const std::byte> bytes, const LodKey&
     e.bounds_lo = Vec3(level.bounds_lo[0], level.bounds_lo[1], level.bounds_lo[2]);
     e.bounds_hi = Vec3(level.bounds_hi[0], level.bounds_hi[1], level.bounds_hi[2]);
     e.stream_bits = {level.stream_bits[0], level.stream_bits[1], level.stream_bits[2], level.stream_bits[3]};
-    lod.levels.push_back({std::move(e), level.triangles, level.group_count, level.error});
+    lod.levels.push_back({std::move(e), level.triangles, level.group_count, level.error,
+                          static_cast<NormalEncoding>(level.normal_encoding), level.max_normal_error,
+                          level.mean_normal_error});
   }
   if (cluster != clusters.size() || byte != payload.size()) return std::nullopt;
   return lod;
@@ -152,7 +159,7 @@ LodKey lod_key(const QuantizedGeometry& g, const GeometryClusters& base, const L
         static_cast<uint64_t>(g.normal_encoding), static_cast<uint64_t>(g.uv_encoding),
         static_cast<uint64_t>(g.uv_exponent[0]), static_cast<uint64_t>(g.uv_exponent[1]),
         static_cast<uint64_t>(g.origin[0]), static_cast<uint64_t>(g.origin[1]), static_cast<uint64_t>(g.origin[2]),
-        uint64_t{g.anchor_shift}})
+        uint64_t{g.anchor_shift}, uint64_t{limits.coarser_normals}})
     hash.add_number(number);
   hash.add(g.positions);
   hash.add(g.vertices);

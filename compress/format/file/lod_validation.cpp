@@ -9,13 +9,13 @@ namespace {
 
 bool is_level(const baked::GeometryRecord& g) { return (g.flags & baked::kLodLevel) != 0; }
 
-/// Whether a level's clusters share the base's lattice, encodings and slots.
+/// Whether a level's clusters share the base's lattice, encoding of texture coordinates, and slots.
 bool alike(const baked::GeometryRecord& level, const baked::GeometryRecord& base) {
   return level.flags == (base.flags | baked::kLodLevel) && level.origin == base.origin &&
          level.step_mantissa == base.step_mantissa && level.step_exponent == base.step_exponent &&
-         level.anchor_shift == base.anchor_shift && level.normal_encoding == base.normal_encoding &&
-         level.uv_encoding == base.uv_encoding && level.uv_exponent == base.uv_exponent &&
-         level.slot_count == base.slot_count && level.position_error_bound == base.position_error_bound;
+         level.anchor_shift == base.anchor_shift && level.uv_encoding == base.uv_encoding &&
+         level.uv_exponent == base.uv_exponent && level.slot_count == base.slot_count &&
+         level.position_error_bound == base.position_error_bound;
 }
 
 /// Checks the groups and links of one geometry.

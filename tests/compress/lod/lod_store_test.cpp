@@ -125,8 +125,8 @@ TEST(LodStore, LevelsThatNoFileMayHoldAreMadeAgain) {
   EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, group), ~0u));
   EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, generating_group), 0u));
   EXPECT_TRUE(kept.refuses(kLinks, kept.bytes(kLinks) - sizeof(uint32_t), ~0u));
-  // Fields of a level: triangles, payload bytes, stream bits, counts, clusters by class, bounds, error.
-  constexpr size_t kLevelBytes = 128;
+  // Fields of a level: triangles, payload bytes, stream bits, counts, clusters by class, bounds, error, normals.
+  constexpr size_t kLevelBytes = 136;
   for (const size_t level : {size_t{0}, kLevelBytes})
     for (size_t byte = 0; byte < kLevelBytes; byte += 4) {
       if (level == 0 && byte >= 56 && byte < 120) continue; // counts and bounds of level 0 are taken from the geometry
