@@ -21,6 +21,7 @@
 #include "pbrt_import/base/progress.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/benchmark_options.h"
+#include "tests/benchmarks/lod_benchmark_groups.h"
 #include "tests/benchmarks/lod_benchmark_newest.h"
 #include "tests/benchmarks/lod_benchmark_simplifiers.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
@@ -81,13 +82,6 @@ std::vector<DVec3> lattice_points(const QuantizedGeometry& geometry, const std::
   return points;
 }
 
-void append_points(const ClusterLod& lod, const LodCluster& cluster, std::vector<Triangle>& out) {
-  for (uint32_t i = 0; i < cluster.range.triangle_count; ++i) {
-    const Triangle& t = lod.triangles[cluster.range.first_triangle + i];
-    out.emplace_back(lod.vertices[t.x].position, lod.vertices[t.y].position, lod.vertices[t.z].position);
-  }
-}
-
 /// Distance between two surfaces, in both directions; lattice steps.
 struct Distance {
   double rms = 0.0, max = 0.0;
@@ -98,87 +92,6 @@ Distance between(const BareMesh& a, const SurfaceDistance& to_a, const BareMesh&
   const DistanceStats from_b = surface_distance(b.positions, b.triangles, to_a, samples);
   return {std::max(from_a.rms, from_b.rms), std::max(from_a.max, from_b.max)};
 }
-
-constexpr double kMeasurable = 1e-6; // lattice steps; smaller measured distances are rounding errors
-
-/// Per group, the clusters made from it and the level 0 clusters that it represents.
-class GroupSurfaces {
-public:
-  explicit GroupSurfaces(const ClusterLod& lod)
-      : lod_(lod), made_(lod.groups.size()), base_(lod.groups.size()), below_(lod.groups.size()),
-        measured_(lod.groups.size()) {
-    for (uint32_t i = 0; i < lod.clusters.size(); ++i) {
-      const LodCluster& c = lod.clusters[i];
-      if (c.generating_group == kNoGroup) {
-        base_[c.group].push_back(i);
-      } else {
-        made_[c.generating_group].push_back(i);
-        below_[c.group].push_back(c.generating_group);
-      }
-    }
-    for (size_t i = 0; i < base_.size(); ++i) { // groups are ordered by level
-      make_unique(below_[i]);
-      for (const uint32_t group : below_[i]) base_[i].insert(base_[i].end(), base_[group].begin(), base_[group].end());
-      make_unique(base_[i]);
-    }
-  }
-
-  /// Returns the ratio of stated to measured error of each group that made clusters of this level and whose measured
-  /// error is not only rounding. Measured are the distance of its clusters from the whole of level 0, and the distance
-  /// from the whole level of those level 0 clusters that no other group of the level represents.
-  std::vector<double> ratios(uint32_t level, const std::vector<DVec3>& points, const SurfaceDistance& to_base,
-                             const SurfaceDistance& to_level) {
-    constexpr size_t kSamples = 3000; // per group
-    std::vector<uint32_t> sharers(lod_.clusters.size());
-    for_each_group(level, [&](uint32_t group) {
-      for (const uint32_t cluster : base_[group]) ++sharers[cluster];
-    });
-    std::vector<double> result;
-    for_each_group(level, [&](uint32_t group) {
-      std::vector<Triangle> made, base;
-      for (const uint32_t cluster : made_[group]) append_points(lod_, lod_.clusters[cluster], made);
-      for (const uint32_t cluster : base_[group])
-        if (sharers[cluster] == 1) append_points(lod_, lod_.clusters[cluster], base);
-      const double measured = std::max(surface_distance(points, made, to_base, kSamples).max,
-                                       surface_distance(points, base, to_level, kSamples).max);
-      measured_[group] = measured;
-      if (measured > kMeasurable) result.push_back(lod_.groups[group].error / measured);
-      excess_ = std::max(excess_, measured - lod_.groups[group].error * (1.0 + 1e-6));
-    });
-    return result;
-  }
-  /// Largest amount by which a group's measured error exceeds its stated error; lattice steps.
-  double excess() const { return excess_; }
-
-  /// Like ratios(), against the largest measured error of a group and all groups below it; the stated error must not be
-  /// below that. Call for the levels in order, after ratios().
-  std::vector<double> ratios_to_largest(uint32_t level) {
-    std::vector<double> result;
-    for_each_group(level, [&](uint32_t group) {
-      for (const uint32_t below : below_[group]) measured_[group] = std::max(measured_[group], measured_[below]);
-      if (measured_[group] > kMeasurable) result.push_back(lod_.groups[group].error / measured_[group]);
-    });
-    return result;
-  }
-
-private:
-  static void make_unique(std::vector<uint32_t>& numbers) {
-    std::sort(numbers.begin(), numbers.end());
-    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
-  }
-
-  template <typename Visit>
-  void for_each_group(uint32_t level, const Visit& visit) const {
-    for (uint32_t i = 0; i < lod_.groups.size(); ++i)
-      if (lod_.groups[i].level + 1 == level && !lod_.groups[i].terminal) visit(i);
-  }
-
-  const ClusterLod& lod_;
-  std::vector<std::vector<uint32_t>> made_, base_; ///< cluster numbers, per group
-  std::vector<std::vector<uint32_t>> below_;       ///< group numbers, per group
-  std::vector<double> measured_;                   ///< per group
-  double excess_ = 0.0;
-};
 
 /// Number of triangles of the cut for an error limit: the cost that users pay for it.
 uint64_t cut_triangles(const ClusterLod& lod, double error) {
@@ -213,7 +126,7 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
   const double size = diagonal(base.positions);
 
   Json levels = Json::array();
-  GroupSurfaces groups(lod);
+  GroupSurfaces groups(lod, base.positions);
   std::vector<double> all_ratios, all_ratios_to_largest;
   double stated = 0.0; // largest error of all groups up to this level
   fmt::print(
@@ -234,7 +147,7 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
     for (const double e : errors) stated = std::max(stated, e);
     const SurfaceDistance to_level(level_mesh.positions, level_mesh.triangles);
     const Distance d = level == 0 ? Distance{} : between(base, to_base, level_mesh, to_level, options.samples);
-    const std::vector<double> ratios = groups.ratios(level, base.positions, to_base, to_level);
+    const std::vector<double> ratios = groups.ratios(level);
     const std::vector<double> ratios_to_largest = groups.ratios_to_largest(level);
     const double ratio = median(ratios), ratio_to_largest = median(ratios_to_largest);
     all_ratios.insert(all_ratios.end(), ratios.begin(), ratios.end());

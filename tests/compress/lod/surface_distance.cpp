@@ -1,12 +1,11 @@
 #include "tests/compress/lod/surface_distance.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <tbb/parallel_for.h>
-
-#include "compress/bake/lod/bound/triangle_distance.h"
 
 namespace packtrace {
 namespace {
@@ -15,19 +14,42 @@ struct Query {
   std::span<const DVec3> positions;
   std::span<const Triangle> triangles;
   DVec3 point;
+  double rounding; ///< of coordinates to float
   double best2 = std::numeric_limits<double>::infinity();
 };
+
+double squared(DVec3 v) { return glm::dot(v, v); }
+
+double segment_distance2(DVec3 p, DVec3 a, DVec3 b) {
+  const double length2 = squared(b - a);
+  const double t = length2 > 0.0 ? std::clamp(glm::dot(p - a, b - a) / length2, 0.0, 1.0) : 0.0;
+  return squared(p - a - t * (b - a));
+}
+
+/// By planes through the sides instead of products of dot products, which are inexact for long needles.
+double triangle_distance2(DVec3 p, const std::array<DVec3, 3>& corners) {
+  const DVec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+  double to_sides = std::numeric_limits<double>::infinity();
+  bool is_over = squared(normal) > 0.0;
+  for (size_t i = 0; i < 3; ++i) {
+    const DVec3 &a = corners[i], &b = corners[(i + 1) % 3];
+    is_over = is_over && glm::dot(glm::cross(normal, b - a), p - a) >= 0.0;
+    to_sides = std::min(to_sides, segment_distance2(p, a, b));
+  }
+  if (!is_over) return to_sides;
+  const double height = glm::dot(normal, p - corners[0]);
+  return std::min(to_sides, height * height / squared(normal));
+}
 
 bool visit(RTCPointQueryFunctionArguments* args) {
   auto& query = *static_cast<Query*>(args->userPtr);
   const Triangle& t = query.triangles[args->primID];
-  const DVec3 d =
-      query.point - nearest_point(query.point, query.positions[t.x], query.positions[t.y], query.positions[t.z]);
-  const double distance2 = glm::dot(d, d);
+  const double distance2 =
+      triangle_distance2(query.point, {query.positions[t.x], query.positions[t.y], query.positions[t.z]});
   if (!(distance2 < query.best2)) return false;
   query.best2 = distance2;
   // Slightly larger, as boxes and queries are rounded to float.
-  args->query->radius = static_cast<float>(std::sqrt(distance2) * 1.000001);
+  args->query->radius = static_cast<float>(std::sqrt(distance2) * 1.000001 + query.rounding);
   return true;
 }
 
@@ -57,7 +79,8 @@ SurfaceDistance::~SurfaceDistance() {
 }
 
 double SurfaceDistance::operator()(DVec3 point) const {
-  Query query{positions_, triangles_, point};
+  const double size = std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)});
+  Query query{positions_, triangles_, point, 4.0 * std::numeric_limits<float>::epsilon() * size};
   RTCPointQuery rtc_query{static_cast<float>(point.x), static_cast<float>(point.y), static_cast<float>(point.z), 0.0f,
                           std::numeric_limits<float>::infinity()};
   RTCPointQueryContext context;
