@@ -139,5 +139,40 @@ TEST(TriangleRefiner, FlatPartsHaveNoTangentialDistance) {
   EXPECT_EQ(bound, noted);
 }
 
+/// A side that spans a notch of the border is far from it only between its ends, where no corner shows how far.
+TEST(TriangleRefiner, WhatSpansANotchIsAsFarAsItsMiddle) {
+  constexpr uint32_t kCells = 8;
+  constexpr double kDepth = 0.02;
+  const auto point = [](uint32_t x, uint32_t y) { return DVec3(x, x == 4 && y == 0 ? kDepth : 1.0 * y, 0.0); };
+  TriangleRefiner refiner;
+  TriangleSet& among = refiner.begin();
+  for (uint32_t y = 0; y < kCells; ++y)
+    for (uint32_t x = 0; x < kCells; ++x) {
+      among.add({point(x, y), point(x + 1, y), point(x + 1, y + 1)}, 2 * (kCells * y + x));
+      among.add({point(x, y), point(x + 1, y + 1), point(x, y + 1)}, 2 * (kCells * y + x) + 1);
+    }
+  refiner.measure_corners({DVec3(0.0, 0.0, 0.0), DVec3(8.0, 0.0, 0.0), DVec3(4.1, 8.0, 0.0)});
+  const double bound = refiner.run([](double, uint32_t) { return false; }, [](uint32_t, double) {});
+  EXPECT_GE(bound, 0.999 * kDepth);
+  EXPECT_LE(bound, 1.25 * kDepth);
+}
+
+TEST(TriangleSubtraction, HalvesShareOnlyTheirCut) {
+  const std::vector<DVec3> corners = {{0, 0, 0}, {4, 0, 0}, {5, 2, 0}, {3, 4, 0}, {0, 3, 0}};
+  const auto area = [](const TriangleSubtraction::Polygon& p) {
+    double sum = 0.0;
+    for (uint32_t i = 2; i < p.count; ++i)
+      sum += 0.5 * glm::cross(p.corners[i - 1] - p.corners[0], p.corners[i] - p.corners[0]).z;
+    return sum;
+  };
+  for (size_t count = 3; count <= corners.size(); ++count) {
+    TriangleSubtraction::Polygon whole;
+    for (size_t i = 0; i < count; ++i) whole.add(corners[i]);
+    const auto [one, other] = TriangleSubtraction::halves(whole);
+    EXPECT_NEAR(area(one) + area(other), area(whole), 1e-12) << count;
+    EXPECT_GT(std::min(area(one), area(other)), 0.2 * area(whole)) << count;
+  }
+}
+
 } // namespace
 } // namespace packtrace::test

@@ -47,8 +47,19 @@ public:
   template <typename Enough, typename Noted>
   double run(const Enough& enough, const Noted& noted) {
     if (levels_[0].kept.empty()) return std::numeric_limits<double>::infinity();
-    largest_ = 0.0;
-    cut(0, {0, 1, 2}, enough, noted);
+    largest_ = proven_ = 0.0;
+    limit_ = std::numeric_limits<double>::infinity();
+    is_exhausted_ = false;
+    parts_.clear();
+    cut(0, {0, 1, 2}, enough);
+    if (const double loose = largest_; is_exhausted_ && loose > kLoose * proven_) {
+      std::swap(parts_, loose_parts_);
+      parts_.clear();
+      largest_ = 0.0, limit_ = loose;
+      cut(0, {0, 1, 2}, enough);
+      if (largest_ >= loose) largest_ = loose, std::swap(parts_, loose_parts_);
+    }
+    for (const auto& [number, distance] : parts_) noted(number, distance);
     return largest_;
   }
 
@@ -60,7 +71,11 @@ private:
   static constexpr size_t kSubtractedCuts = 2; // parts that were cut more often are not subtracted from
   // Subtracts only where the bound is this many times the lower bound: mostly tangential distance.
   static constexpr double kLeak = 8.0;
-  static constexpr size_t kMaxSubtracted = 48; // triangles
+  // Bounds above this many times a lower bound are measured once more, when that is known.
+  static constexpr double kLoose = 2.0;
+  static constexpr size_t kMaxLookedAt = 512;  // triangles of a set that is subtracted from
+  static constexpr size_t kMaxSubtracted = 48; // triangles near enough to be subtracted
+  static constexpr size_t kMaxRestCuts = 4;    // of what is left after subtraction
   static constexpr double kGoodEnough = 1.1;   // stops within this factor of the lower bound
   static constexpr double kRounding = 1e-6;    // rounding error of differences of distances, in grid steps
 
@@ -85,41 +100,45 @@ private:
     work_ += 3 * level.among->size();
   }
 
-  /// Bounds a part of the triangle, subdividing it while that helps. Calls noted() for the final parts.
-  template <typename Enough, typename Noted>
-  void cut(size_t depth, const std::array<size_t, 3>& corners, const Enough& enough, const Noted& noted) {
+  /// Bounds a part of the triangle, subdividing it while that helps. Appends the final parts to parts_.
+  template <typename Enough>
+  void cut(size_t depth, const std::array<size_t, 3>& corners, const Enough& enough) {
     const Level& level = levels_[depth];
     const NearestTriangle nearest =
         level.among->nearest(level.distances[corners[0]], level.distances[corners[1]], level.distances[corners[2]]);
-    const double good = kGoodEnough * nearest.least;
+    proven_ = std::max(proven_, nearest.least);
+    const double good = kGoodEnough * (is_second_run() ? proven_ : nearest.least);
     const uint32_t number = level.among->number(nearest.place);
-    if (depth == kMaxCuts || nearest.distance <= good || enough(nearest.distance, number)) {
+    const bool is_good = nearest.distance <= good || enough(nearest.distance, number);
+    if (depth == kMaxCuts || is_good) {
+      is_exhausted_ |= !is_good;
       largest_ = std::max(largest_, nearest.distance);
-      noted(number, nearest.distance);
+      parts_.emplace_back(number, nearest.distance);
       return;
     }
-    if (depth <= kSubtractedCuts && nearest.distance > kLeak * nearest.least &&
-        covers(depth, corners, good, enough, noted))
-      return;
+    const double leak = is_second_run() ? kLoose * proven_ : kLeak * nearest.least;
+    if (depth <= kSubtractedCuts && nearest.distance > leak && covers(depth, corners, good, enough)) return;
     divide(depth, corners, nearest.place, good, enough);
     for (const std::array<size_t, 3>& part : {std::array<size_t, 3>{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
-      cut(depth + 1, part, enough, noted);
+      if (largest_ < limit_) cut(depth + 1, part, enough);
   }
 
-  /// Bounds a part of the triangle by those of the set that are near enough, each for what lies over it. Calls noted()
-  /// and returns true if nothing is left but what is near enough to one of them.
-  template <typename Enough, typename Noted>
-  bool covers(size_t depth, const std::array<size_t, 3>& corners, double good, const Enough& enough,
-              const Noted& noted) {
+  bool is_second_run() const { return limit_ != std::numeric_limits<double>::infinity(); }
+
+  /// Bounds a part of the triangle by those of the set that are near enough, each for what lies over it. Appends them
+  /// to parts_ and returns true if nothing is left but what is near enough to one of them.
+  template <typename Enough>
+  bool covers(size_t depth, const std::array<size_t, 3>& corners, double good, const Enough& enough) {
     const Level& level = levels_[depth];
     const TriangleSet& among = *level.among;
-    if (among.size() > kMaxSubtracted) return false;
+    if (among.size() > kMaxLookedAt) return false;
     const std::array<DVec3, 3> part = {level.points[corners[0]], level.points[corners[1]], level.points[corners[2]]};
     const auto accept = [&](double distance, uint32_t number) { return distance <= good || enough(distance, number); };
     subtraction_.begin(part);
     taken_.clear();
     find_near(level, corners, part, accept);
     work_ += among.size();
+    if (near_.size() > kMaxSubtracted) return false;
     for (size_t k = 0; k < near_.size() && !subtraction_.rest().empty(); ++k) {
       const uint32_t number = among.number(near_[k]);
       subtraction_.subtract(
@@ -128,22 +147,45 @@ private:
       if (subtraction_.rest().size() > TriangleSubtraction::kMaxRest) return false;
     }
     if (taken_.empty()) return false;
-    for (const TriangleSubtraction::Polygon& rest : subtraction_.rest()) {
-      work_ += among.size();
-      const size_t before = taken_.size();
-      for (size_t k = 0; k < near_.size() && taken_.size() == before; ++k) {
-        const uint32_t number = among.number(near_[k]);
-        const double distance = TriangleSubtraction::distance(
-            rest, among.corners(near_[k]), [&](double of_corner) { return accept(of_corner, number); });
-        if (accept(distance, number)) taken_.emplace_back(number, distance);
-      }
-      if (taken_.size() == before) return false;
-    }
-    for (const auto& [number, distance] : taken_) {
-      largest_ = std::max(largest_, distance);
-      noted(number, distance);
-    }
+    for (const TriangleSubtraction::Polygon& rest : subtraction_.rest())
+      if (!takes_rest(among, rest, accept, 0)) return false;
+    for (const auto& [number, distance] : taken_) largest_ = std::max(largest_, distance);
+    parts_.insert(parts_.end(), taken_.begin(), taken_.end());
     return true;
+  }
+
+  /// Whether each part of a polygon is at an accepted distance from one of near_. Appends those to taken_.
+  template <typename Accept>
+  bool takes_rest(const TriangleSet& among, const TriangleSubtraction::Polygon& rest, const Accept& accept,
+                  size_t depth) {
+    work_ += near_.size();
+    for (const uint32_t near : near_) {
+      const uint32_t number = among.number(near);
+      const double distance = TriangleSubtraction::distance(
+          rest, among.corners(near), [&](double of_corner) { return accept(of_corner, number); });
+      if (!accept(distance, number)) continue;
+      taken_.emplace_back(number, distance);
+      return true;
+    }
+    if (depth == kMaxRestCuts) return false;
+    for (uint32_t i = 0; i < rest.count; ++i) {
+      const DVec3& corner = rest.corners[i];
+      const auto reaches = [&](uint32_t near) {
+        const std::array<DVec3, 3> c = among.corners(near);
+        return accept(glm::length(corner - nearest_point(corner, c[0], c[1], c[2])), among.number(near));
+      };
+      work_ += near_.size();
+      if (std::any_of(near_.begin(), near_.end(), reaches)) continue;
+      double least = std::numeric_limits<double>::infinity();
+      for (size_t k = 0; k < among.size(); ++k) {
+        const std::array<DVec3, 3> c = among.corners(k);
+        least = std::min(least, glm::length(corner - nearest_point(corner, c[0], c[1], c[2])));
+      }
+      proven_ = std::max(proven_, least);
+      return false;
+    }
+    const auto [one, other] = TriangleSubtraction::halves(rest);
+    return takes_rest(among, one, accept, depth + 1) && takes_rest(among, other, accept, depth + 1);
   }
 
   /// Distances from each corner to the farthest point of a part.
@@ -208,8 +250,12 @@ private:
   std::array<Level, kMaxCuts + 1> levels_;
   std::vector<uint32_t> near_;
   TriangleSubtraction subtraction_;
-  std::vector<std::pair<uint32_t, double>> taken_; ///< triangle numbers with distances
-  double largest_ = 0.0;
+  std::vector<std::pair<uint32_t, double>> taken_;               ///< triangle numbers with distances
+  std::vector<std::pair<uint32_t, double>> parts_, loose_parts_; ///< candidates with distances
+  double largest_ = 0.0;                                         ///< of parts_
+  double proven_ = 0.0;                                          ///< lower bound of the triangle's distance
+  double limit_ = 0.0;                                           ///< bound of the first run; infinite during it
+  bool is_exhausted_ = false;                                    ///< whether parts were too small to be subdivided
   size_t work_ = 0;
 };
 

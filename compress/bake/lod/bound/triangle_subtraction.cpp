@@ -49,6 +49,30 @@ bool TriangleSubtraction::Prism::is_beyond_a_side(const Polygon& polygon) const 
   return false;
 }
 
+/// The other end of the cut is the corner or the middle of a side that is half way around the polygon.
+std::pair<TriangleSubtraction::Polygon, TriangleSubtraction::Polygon>
+TriangleSubtraction::halves(const Polygon& polygon) {
+  const uint32_t count = polygon.count;
+  const auto at = [&](uint32_t i) { return polygon.corners[i % count]; };
+  uint32_t longest = 0;
+  double length = -1.0;
+  for (uint32_t i = 0; i < count; ++i)
+    if (const double next = glm::length(at(i + 1) - at(i)); next > length) length = next, longest = i;
+  const DVec3 middle = 0.5 * (at(longest) + at(longest + 1));
+  // The corners after the longest side are numbered longest + 1 to longest + count.
+  const uint32_t half = longest + 1 + count / 2;
+  const bool at_corner = count % 2 == 1;
+  const DVec3 opposite = at_corner ? at(half) : 0.5 * (at(half - 1) + at(half));
+  Polygon one, other;
+  one.add(middle);
+  for (uint32_t i = longest + 1; i < half; ++i) one.add(at(i));
+  one.add(opposite);
+  other.add(opposite);
+  for (uint32_t i = half + (at_corner ? 1 : 0); i <= longest + count; ++i) other.add(at(i));
+  other.add(middle);
+  return {one, other};
+}
+
 TriangleSubtraction::Polygon TriangleSubtraction::split(const Polygon& polygon, const Prism& prism) {
   Polygon inside = polygon;
   std::array<double, std::tuple_size_v<decltype(Polygon::corners)>> heights;

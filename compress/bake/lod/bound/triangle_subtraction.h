@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "compress/bake/lod/bound/triangle_distance.h"
@@ -63,6 +64,9 @@ public:
   }
 
   const std::vector<Polygon>& rest() const { return rest_; }
+
+  /// Cuts a polygon through the middle of its longest side.
+  static std::pair<Polygon, Polygon> halves(const Polygon& polygon);
 
   /// Returns the largest distance of the polygon from a triangle, or the first distance of a corner that accept()
   /// rejects.
