@@ -19,12 +19,14 @@ namespace {
 constexpr uint32_t kNoCluster = ~0u;
 // The share of the triangles that a level keeps. Fine levels take most of the time and space, so they are further
 // apart.
-constexpr double kKept = 0.47, kKeptWhenMany = 0.35;
+constexpr double kKept = 0.47, kKeptWhenMany = 0.33;
 constexpr uint64_t kManyTriangles = 2048;
 // The last few hundred triangles are reduced faster: each level adds records that would take more space than its
 // clusters.
 constexpr uint64_t kFewTriangles = 512;
 constexpr double kKeptWhenFew = 0.25;
+// A group is lost if its error is larger than these shares of its radius and of the median group's error.
+constexpr double kLossOverRadius = 0.25, kLossOverMedian = 4.0;
 constexpr uint64_t kCoarsest = 16;        // levels with at most this many triangles are the last
 constexpr double kInflation = 1.0 + 1e-6; // of bounding spheres, to cover rounding errors
 
@@ -130,6 +132,7 @@ private:
         results[i] = simplify_group(members[i], kept_of(all));
         progress_.advance(triangles);
       });
+      keep_lost(members, results);
       give_up(members, results);
     }
     for (size_t i = 0; i < members.size(); ++i)
@@ -183,6 +186,41 @@ private:
           }
       }
     });
+  }
+
+  /// Keeps the triangles of groups that simplification would destroy while most of the level changes little. Parts of a
+  /// few triangles that touch no other group, such as a floor of two, are such groups. Clusters are grouped with others
+  /// later, and errors never decrease, so one such error would bind the whole surface in all levels above.
+  void keep_lost(const std::vector<std::vector<uint32_t>>& members, std::vector<SimplifiedGroup>& results) const {
+    std::vector<std::pair<double, uint64_t>> errors; // and triangles
+    uint64_t all = 0, passed = 0;
+    for (const SimplifiedGroup& r : results)
+      errors.emplace_back(r.error, r.source_triangles), all += r.source_triangles;
+    std::sort(errors.begin(), errors.end());
+    double median = 0.0;
+    for (const auto& [error, triangles] : errors) {
+      median = error, passed += triangles;
+      if (2 * passed >= all) break;
+    }
+    for (size_t i = 0; i < results.size(); ++i) {
+      if (results[i].error <= kLossOverMedian * median || results[i].error <= kLossOverRadius * radius_of(members[i]))
+        continue;
+      results[i] = simplify_group(members[i], 1.0);
+    }
+  }
+
+  /// Half the diagonal of the box of a group's points.
+  double radius_of(const std::vector<uint32_t>& members) const {
+    DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+    for (const uint32_t number : members) {
+      const ClusterRange& range = lod_.clusters[number].range;
+      for (uint32_t i = 0; i < range.triangle_count; ++i)
+        for (int corner = 0; corner < 3; ++corner) {
+          const DVec3 p = point(lod_.vertices[lod_.triangles[range.first_triangle + i][corner]].position);
+          lo = glm::min(lo, p), hi = glm::max(hi, p);
+        }
+    }
+    return 0.5 * glm::length(hi - lo);
   }
 
   /// Drops the results of groups that kept too many triangles, so that they become terminal. Where the locks of other

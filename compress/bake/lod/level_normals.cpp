@@ -104,9 +104,10 @@ double level_normal_limit(const QuantizedGeometry& geometry, const GeometryClust
   std::sort(turns.begin(), turns.end(),
             [](const Turn& a, const Turn& b) { return std::pair(a.ratio, a.area) < std::pair(b.ratio, b.area); });
   double passed = 0.0;
-  for (const Turn& turn : turns)
-    if ((passed += turn.area) >= kLooserShare * all)
-      return kShareOfTurn * std::atan(4.0 * turn.ratio) * kDegreesPerRadian;
+  for (const Turn& turn : turns) {
+    passed += turn.area;
+    if (passed >= kLooserShare * all) return kShareOfTurn * std::atan(4.0 * turn.ratio) * kDegreesPerRadian;
+  }
   return 0.0;
 }
 

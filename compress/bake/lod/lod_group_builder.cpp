@@ -6,11 +6,11 @@
 #include <tuple>
 #include <utility>
 
-#include "compress/bake/clusters/clusterize.h"
 #include "compress/bake/clusters/morton.h"
 #include "compress/bake/clusters/renumbering.h"
 #include "compress/bake/lod/bound/direct_bound.h"
 #include "compress/bake/lod/bound/surface_bound.h"
+#include "compress/bake/lod/level_clusters.h"
 #include "compress/bake/lod/loose_pieces.h"
 #include "compress/bake/lod/simplify/simplify.h"
 #include "compress/format/cluster/normal_codec.h"
@@ -228,8 +228,9 @@ private:
       points.push_back(mesh_.triangles[triangle].points);
       centroids.push_back(corner_sum(triangle));
     }
-    const Clusters clusters = clusterize({vertices, points, centroids, static_cast<uint32_t>(numbers.values.size()),
-                                          static_cast<uint32_t>(mesh_.points.size())});
+    const Clusters clusters = split_level({vertices, points, centroids, static_cast<uint32_t>(numbers.values.size()),
+                                           static_cast<uint32_t>(mesh_.points.size())},
+                                          mesh_.points, !in_.geometry.kinds[kind].flat);
     const auto before = static_cast<uint32_t>(out_.triangles.size());
     for (const uint32_t member : clusters.order) {
       out_.triangles.push_back(vertices_[triangles[member]]);

@@ -21,7 +21,7 @@ namespace packtrace {
 namespace {
 
 /// Increment with every change to what the builder or encoder produces for the same geometry.
-constexpr uint32_t kRevision = 9;
+constexpr uint32_t kRevision = 10;
 constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 'L', 'O', 'D', '\n', 0};
 constexpr const char* kExtension = ".ptklod";
 
