@@ -9,6 +9,7 @@
 #include "compress/bake/clusters/morton.h"
 #include "compress/bake/clusters/renumbering.h"
 #include "compress/bake/lod/bound/direct_bound.h"
+#include "compress/bake/lod/bound/stated_error.h"
 #include "compress/bake/lod/bound/surface_bound.h"
 #include "compress/bake/lod/level_clusters.h"
 #include "compress/bake/lod/loose_pieces.h"
@@ -51,12 +52,13 @@ private:
     std::vector<double> errors;
     for (const LodTriangle& t : mesh_.triangles) errors.push_back(t.error);
     const std::vector<TriangleSubstitute> stands = drop_loose_pieces(mesh_, {target, share_of_triangles(kWorthwhile)});
+    const std::vector<double> bounds = links_.bounds;
     for (SurfaceLink& link : links_.links) {
       const TriangleSubstitute& stand = stands[link.simplified];
       link.simplified = stand.triangle;
       double& bound = links_.bounds[link.source];
       dropped_ |= stand.dropped;
-      if (stand.dropped) bound = std::max(bound, mesh_.triangles[stand.triangle].error);
+      if (stand.dropped) bound = std::max(bound, stated_error(stand.distance, bounds[link.source]));
     }
     // Dropping pieces does not change the distance of the remaining triangles from the surface that they represent.
     for (size_t i = 0; i < stands.size(); ++i)

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "compress/bake/lod/bound/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_set.h"
 
 namespace packtrace {
 namespace {
@@ -34,7 +35,6 @@ public:
 
   std::vector<TriangleSubstitute> run(const DropTargets& targets) {
     find_pieces();
-    stand_of_.assign(pieces_.size(), kNoPiece);
     if (pieces_.size() > 1) drop_some(targets);
     return remove_dropped();
   }
@@ -72,7 +72,6 @@ private:
     t.error = std::max(t.error, pieces_[piece].error + stand.distance);
     pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
     pieces_[piece].dropped = true;
-    stand_of_[piece] = stand.triangle;
   }
 
   void find_pieces() {
@@ -146,24 +145,39 @@ private:
     for (uint32_t i = 0; i < pieces_.size(); ++i)
       for (const uint32_t triangle : pieces_[i].triangles) piece_of[triangle] = i;
     std::vector<TriangleSubstitute> stands(m_.triangles.size());
-    uint32_t kept = 0;
+    TriangleSet kept;
     for (size_t i = 0; i < stands.size(); ++i) {
       stands[i].dropped = pieces_[piece_of[i]].dropped;
-      if (!stands[i].dropped) stands[i].triangle = kept, m_.triangles[kept++] = m_.triangles[i];
+      if (stands[i].dropped) continue;
+      stands[i].triangle = static_cast<uint32_t>(kept.size());
+      kept.add(corners(m_.triangles[i]), stands[i].triangle);
     }
-    m_.triangles.resize(kept);
-    for (size_t i = 0; i < stands.size(); ++i) {
-      if (!stands[i].dropped) continue;
-      auto stand = static_cast<uint32_t>(i);
-      while (stands[stand].dropped) stand = stand_of_[piece_of[stand]]; // that triangle may have been dropped later
-      stands[i].triangle = stands[stand].triangle;
-    }
+    for (size_t i = 0; i < stands.size(); ++i)
+      if (stands[i].dropped) find_nearest(corners(m_.triangles[i]), kept, stands[i]);
+    for (size_t i = 0; i < stands.size(); ++i)
+      if (!stands[i].dropped) m_.triangles[stands[i].triangle] = m_.triangles[i];
+    m_.triangles.resize(kept.size());
     return stands;
+  }
+
+  std::array<DVec3, 3> corners(const LodTriangle& t) const {
+    return {m_.points[t.points.x], m_.points[t.points.y], m_.points[t.points.z]};
+  }
+
+  void find_nearest(const std::array<DVec3, 3>& dropped, const TriangleSet& kept, TriangleSubstitute& stand) {
+    std::array<double*, 3> rows;
+    for (size_t k = 0; k < 3; ++k) {
+      distances_[k].resize(kept.padded_size());
+      rows[k] = distances_[k].data();
+    }
+    kept.distances(dropped, rows);
+    const NearestTriangle nearest = kept.nearest(rows[0], rows[1], rows[2]);
+    stand.triangle = kept.number(nearest.place), stand.distance = nearest.distance;
   }
 
   SimplifyMesh& m_;
   std::vector<Piece> pieces_;
-  std::vector<uint32_t> stand_of_; ///< per dropped piece: the triangle that represents it
+  std::array<std::vector<double>, 3> distances_; ///< of a dropped triangle's corners from all others
 };
 
 } // namespace

@@ -16,11 +16,12 @@ struct DropTargets {
   uint32_t at_any_cost = 0;
 };
 
-/// The representative of a triangle after the drop: the triangle itself or, if it was dropped, one near it. Triangle
-/// numbers are those of the new mesh.
+/// The representative of a triangle after the drop: the triangle itself or, if it was dropped, the one that is nearest
+/// to all of it. Triangle numbers are those of the new mesh.
 struct TriangleSubstitute {
   uint32_t triangle = 0;
   bool dropped = false;
+  double distance = 0.0; ///< largest distance of the dropped triangle from its representative
 };
 
 /// Drops connected pieces without locked points, in order of their distance from other pieces; at least one piece
