@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/grid/nearest_triangles.h"
-#include "compress/bake/grid/touching_boxes.h"
 
 namespace packtrace {
 namespace {
@@ -34,21 +34,46 @@ struct Probe {
   DVec3 middle() const { return origin + 0.5 * reach * direction; }
 };
 
+/// Six ends of a box as vectors: a box overlaps another one if each of its lows() is at most the other's highs().
+struct BoxEnds {
+  using Pair = double __attribute__((vector_size(16)));
+  std::array<Pair, 3> pairs;
+
+  static BoxEnds lows(const Bounds& box) { return of({box.lo.x, box.lo.y, box.lo.z, -box.hi.x, -box.hi.y, -box.hi.z}); }
+  static BoxEnds highs(const Bounds& box) {
+    return of({box.hi.x, box.hi.y, box.hi.z, -box.lo.x, -box.lo.y, -box.lo.z});
+  }
+  bool at_most(const BoxEnds& other) const {
+    const auto all = (pairs[0] <= other.pairs[0]) & (pairs[1] <= other.pairs[1]) & (pairs[2] <= other.pairs[2]);
+    std::array<int64_t, 2> lanes;
+    std::memcpy(lanes.data(), &all, sizeof lanes);
+    return (lanes[0] & lanes[1]) != 0;
+  }
+
+private:
+  static BoxEnds of(const std::array<double, 6>& ends) {
+    BoxEnds out;
+    std::memcpy(out.pairs.data(), ends.data(), sizeof ends);
+    return out;
+  }
+};
+
 /// Binary tree over probes.
 class ProbeTree {
 public:
   explicit ProbeTree(std::vector<Probe> probes) : probes_(std::move(probes)) {
-    if (!probes_.empty()) add_node(0, probes_.size());
+    if (!probes_.empty()) build();
   }
 
   std::span<const Probe> probes() const { return probes_; }
 
   /// The smallest subtree that contains all probes that may overlap a box; nullopt if there are none.
   std::optional<uint32_t> subtree_of(const Bounds& box) const {
-    if (nodes_.empty() || !overlap(nodes_[0].box, box)) return std::nullopt;
+    const BoxEnds highs = BoxEnds::highs(box);
+    if (nodes_.empty() || !nodes_[0].lows.at_most(highs)) return std::nullopt;
     uint32_t node = 0;
     while (nodes_[node].right != 0) {
-      const bool left = overlap(nodes_[node + 1].box, box), right = overlap(nodes_[nodes_[node].right].box, box);
+      const bool left = nodes_[node + 1].lows.at_most(highs), right = nodes_[nodes_[node].right].lows.at_most(highs);
       if (!left && !right) return std::nullopt;
       if (left && right) break;
       node = left ? node + 1 : nodes_[node].right;
@@ -63,15 +88,16 @@ public:
   size_t visit(uint32_t subtree, const std::array<DVec3, 3>& t, DVec3 normal, const Visit& visit) const {
     Bounds box;
     for (const DVec3 corner : t) box.extend(corner);
+    const BoxEnds highs = BoxEnds::highs(box);
+    const DVec3 steep = glm::abs(normal) * (0.5 * kPad);
     std::array<uint32_t, 64> stack;
     size_t size = 0, tests = 0;
     stack[size++] = subtree;
     while (size > 0) {
       const Node& node = nodes_[stack[--size]];
       ++tests;
-      if (!overlap(node.box, box)) continue;
-      const DVec3 half = 0.5 * (node.box.hi - node.box.lo);
-      if (std::abs(glm::dot(normal, node.box.lo + half - t[0])) > glm::dot(glm::abs(normal), half) * kPad) continue;
+      if (!node.lows.at_most(highs)) continue;
+      if (std::abs(glm::dot(normal, node.centre - t[0])) > glm::dot(steep, node.extent)) continue;
       if (node.right != 0) {
         stack[size++] = node.right;
         stack[size++] = static_cast<uint32_t>(&node - nodes_.data()) + 1;
@@ -87,36 +113,54 @@ private:
   static constexpr double kPad = 1.0 + 1e-9;
 
   struct Node {
-    Bounds box;
+    BoxEnds lows;
+    DVec3 centre, extent;
     uint32_t right = 0; // the left child follows the node; 0 for leaves
     uint32_t first = 0, count = 0;
   };
 
-  uint32_t add_node(size_t begin, size_t end) {
-    const auto index = static_cast<uint32_t>(nodes_.size());
+  /// A probe's middle, by which probes are divided.
+  struct Middle {
+    DVec3 position;
+    uint32_t probe;
+  };
+
+  void build() {
+    std::vector<Middle> middles(probes_.size());
+    for (uint32_t i = 0; i < middles.size(); ++i) middles[i] = {probes_[i].middle(), i};
+    nodes_.reserve(probes_.size() / 2 + 1);
+    add_node(middles, 0);
+    std::vector<Probe> ordered(probes_.size());
+    for (size_t i = 0; i < ordered.size(); ++i) ordered[i] = probes_[middles[i].probe];
+    probes_ = std::move(ordered);
+  }
+
+  Bounds add_node(std::span<Middle> middles, uint32_t first) {
+    const size_t index = nodes_.size();
     nodes_.emplace_back();
-    Bounds box, middles;
-    for (size_t i = begin; i < end; ++i) {
-      box.extend(probes_[i].origin), box.extend(probes_[i].end());
-      middles.extend(probes_[i].middle());
+    Bounds box;
+    if (middles.size() <= kLeafPoints) {
+      for (const Middle& middle : middles)
+        box.extend(probes_[middle.probe].origin), box.extend(probes_[middle.probe].end());
+      nodes_[index].first = first, nodes_[index].count = static_cast<uint32_t>(middles.size());
+    } else {
+      Bounds around;
+      for (const Middle& middle : middles) around.extend(middle.position);
+      const DVec3 extent = around.hi - around.lo;
+      const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+      const size_t half = middles.size() / 2;
+      std::nth_element(middles.begin(), middles.begin() + static_cast<std::ptrdiff_t>(half), middles.end(),
+                       [axis](const Middle& a, const Middle& b) {
+                         const double x = a.position[axis], y = b.position[axis];
+                         return x < y || (x == y && a.probe < b.probe);
+                       });
+      box = add_node(middles.first(half), first);
+      nodes_[index].right = static_cast<uint32_t>(nodes_.size());
+      box.extend(add_node(middles.subspan(half), first + static_cast<uint32_t>(half)));
     }
-    nodes_[index].box = box;
-    if (end - begin <= kLeafPoints) {
-      nodes_[index].first = static_cast<uint32_t>(begin), nodes_[index].count = static_cast<uint32_t>(end - begin);
-      return index;
-    }
-    const DVec3 extent = middles.hi - middles.lo;
-    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-    const size_t half = begin + (end - begin) / 2;
-    const auto at = [&](size_t i) { return probes_.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(begin), at(half), at(end), [&](const Probe& a, const Probe& b) {
-      const double x = a.middle()[axis], y = b.middle()[axis];
-      return x < y || (x == y && a.point < b.point);
-    });
-    add_node(begin, half);
-    const uint32_t right = add_node(half, end);
-    nodes_[index].right = right;
-    return index;
+    nodes_[index].lows = BoxEnds::lows(box), nodes_[index].centre = box.centre(),
+    nodes_[index].extent = box.hi - box.lo;
+    return box;
   }
 
   std::vector<Probe> probes_;
@@ -124,10 +168,11 @@ private:
 };
 
 /// Distance along a probe to a triangle's plane if the probe hits the triangle; infinity otherwise.
-double hit_distance(const Probe& probe, const std::array<DVec3, 3>& t, DVec3 normal) {
+/// @param least_facing kMinFacing times the length of `normal`
+double hit_distance(const Probe& probe, const std::array<DVec3, 3>& t, DVec3 normal, double least_facing) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const double facing = glm::dot(normal, probe.direction);
-  if (!(std::abs(facing) >= kMinFacing * glm::length(normal))) return kNone;
+  if (!(std::abs(facing) >= least_facing)) return kNone;
   const DVec3 a = t[0] - probe.origin, b = t[1] - probe.origin, c = t[2] - probe.origin;
   const double u = glm::dot(glm::cross(b, c), probe.direction), v = glm::dot(glm::cross(c, a), probe.direction),
                w = glm::dot(glm::cross(a, b), probe.direction);
@@ -222,11 +267,12 @@ private:
 
   void test(const ProbeTree& tree, uint32_t subtree, const std::array<DVec3, 3>& t, uint32_t number) {
     const DVec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const double least_facing = kMinFacing * glm::length(normal);
     tree.visit(subtree, t, normal, [&](uint32_t i) {
       const Probe& probe = tree.probes()[i];
       const VisiblePoint& point = points_[probe.point];
       if (point.triangle == number) return;
-      const double distance = hit_distance(probe, t, normal);
+      const double distance = hit_distance(probe, t, normal, least_facing);
       if (distance >= kMinGapSteps * step_of(point) && distance <= probe.reach)
         hits_.put(i, static_cast<float>(distance), number);
     });
