@@ -5,7 +5,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <optional>
+#include <span>
+#include <vector>
 
 #include <tbb/parallel_for.h>
 
@@ -22,13 +23,15 @@ constexpr double kMaxTests = 0x1p24;        // boxes and triangles tested per im
 constexpr size_t kMinPoints = 512;
 constexpr size_t kLeafPoints = 4;
 constexpr size_t kBlockTriangles = 64;
+constexpr size_t kGroupTriangles = 8; // of a block
+constexpr size_t kMaxStarts = 32;
 constexpr size_t kSampledTriangles = 1024; // about as many triangles estimate the number of tests
 
 /// A segment along a surface normal, on which the facing surface is searched.
 struct Probe {
   DVec3 origin, direction;
-  double reach;
-  uint32_t point;
+  double least_gap, reach; ///< distances along the direction at which surfaces are searched
+  uint32_t point, triangle;
 
   DVec3 end() const { return origin + reach * direction; }
   DVec3 middle() const { return origin + 0.5 * reach * direction; }
@@ -67,32 +70,46 @@ public:
 
   std::span<const Probe> probes() const { return probes_; }
 
-  /// The smallest subtree that contains all probes that may overlap a box; nullopt if there are none.
-  std::optional<uint32_t> subtree_of(const Bounds& box) const {
+  /// Numbers of nodes below which all probes lie that may overlap a box.
+  struct Starts {
+    std::array<uint32_t, kMaxStarts> nodes;
+    size_t count = 0;
+
+    std::span<const uint32_t> span() const { return std::span(nodes).first(count); }
+  };
+  Starts all() const { return {{0}, nodes_.empty() ? size_t{0} : size_t{1}}; }
+
+  /// Leaves out nodes beside a smaller box and replaces inner nodes by those of their children that overlap it.
+  Starts narrowed(const Starts& from, const Bounds& box) const {
     const BoxEnds highs = BoxEnds::highs(box);
-    if (nodes_.empty() || !nodes_[0].lows.at_most(highs)) return std::nullopt;
-    uint32_t node = 0;
-    while (nodes_[node].right != 0) {
-      const bool left = nodes_[node + 1].lows.at_most(highs), right = nodes_[nodes_[node].right].lows.at_most(highs);
-      if (!left && !right) return std::nullopt;
-      if (left && right) break;
-      node = left ? node + 1 : nodes_[node].right;
+    Starts out;
+    for (const uint32_t node : from.span())
+      if (nodes_[node].lows.at_most(highs)) out.nodes[out.count++] = node;
+    for (size_t i = 0; i < out.count && out.count < kMaxStarts;) {
+      const uint32_t left = out.nodes[i] + 1, right = nodes_[out.nodes[i]].right;
+      if (right == 0) {
+        ++i;
+        continue;
+      }
+      const bool in_left = nodes_[left].lows.at_most(highs), in_right = nodes_[right].lows.at_most(highs);
+      out.nodes[i] = in_left ? left : in_right ? right : out.nodes[--out.count];
+      if (in_left && in_right) out.nodes[out.count++] = right;
     }
-    return node;
+    return out;
   }
 
-  /// Calls visit(index of a probe) for probes of a subtree, leaving out nodes whose box misses the triangle's box or
-  /// plane.
+  /// Calls visit(index of a probe) for probes below some nodes, leaving out nodes whose box misses the triangle's box
+  /// or plane.
   /// @return the number of tested boxes and probes
   template <typename Visit>
-  size_t visit(uint32_t subtree, const std::array<DVec3, 3>& t, DVec3 normal, const Visit& visit) const {
+  size_t visit(const Starts& starts, const std::array<DVec3, 3>& t, DVec3 normal, const Visit& visit) const {
     Bounds box;
     for (const DVec3 corner : t) box.extend(corner);
     const BoxEnds highs = BoxEnds::highs(box);
     const DVec3 steep = glm::abs(normal) * (0.5 * kPad);
-    std::array<uint32_t, 64> stack;
-    size_t size = 0, tests = 0;
-    stack[size++] = subtree;
+    std::array<uint32_t, kMaxStarts + 64> stack;
+    size_t size = starts.count, tests = 0;
+    std::copy_n(starts.nodes.begin(), size, stack.begin());
     while (size > 0) {
       const Node& node = nodes_[stack[--size]];
       ++tests;
@@ -217,13 +234,12 @@ private:
     for (uint32_t i = 0; i < points_.size(); ++i) {
       const VisiblePoint& p = points_[i];
       if (p.geometry == baked::kNone || !is_finite(p.position) || !is_finite(p.normal)) continue;
-      const double reach = std::min(kReachSteps * step_of(p), kMaxReach * box.diagonal());
-      probes.push_back({p.position, p.normal, reach, i});
+      const double step = parts_.part_of(p.triangle).step;
+      probes.push_back({p.position, p.normal, kMinGapSteps * step,
+                        std::min(kReachSteps * step, kMaxReach * box.diagonal()), i, p.triangle});
     }
     return probes;
   }
-
-  double step_of(const VisiblePoint& p) const { return parts_.part_of(p.triangle).step; }
 
   /// Estimates the number of boxes and probes that all triangles are tested against.
   double expected_tests(const ProbeTree& tree) const {
@@ -234,7 +250,7 @@ private:
     tbb::parallel_for(size_t{0}, tests.size(), [&](size_t i) {
       if (const auto number = static_cast<uint32_t>(i * stride); number < count) {
         const std::array<DVec3, 3> t = parts_.corners(number, &PlacedParts::source_position);
-        tests[i] = tree.visit(0, t, glm::cross(t[1] - t[0], t[2] - t[0]), [](uint32_t) {});
+        tests[i] = tree.visit(tree.all(), t, glm::cross(t[1] - t[0], t[2] - t[0]), [](uint32_t) {});
       }
     });
     double sum = 0.0;
@@ -251,30 +267,33 @@ private:
       tbb::parallel_for(size_t{0}, (count + kBlockTriangles - 1) / kBlockTriangles, [&](size_t block) {
         const size_t begin = block * kBlockTriangles, end = std::min(begin + kBlockTriangles, count);
         std::array<std::array<DVec3, 3>, kBlockTriangles> triangles;
+        std::array<Bounds, kBlockTriangles / kGroupTriangles> boxes; // per group
         Bounds box;
         for (size_t i = begin; i < end; ++i)
           for (int corner = 0; corner < 3; ++corner) {
             const DVec3 p = parts_.source_position(placed, mesh.triangles[i][corner]);
             triangles[i - begin][static_cast<size_t>(corner)] = p;
-            box.extend(p);
+            boxes[(i - begin) / kGroupTriangles].extend(p);
           }
-        const std::optional<uint32_t> subtree = tree.subtree_of(box);
-        for (size_t i = begin; subtree && i < end; ++i)
-          test(tree, *subtree, triangles[i - begin], placed.first_triangle + static_cast<uint32_t>(i));
+        for (const Bounds& group : boxes) box.extend(group);
+        const ProbeTree::Starts of_block = tree.narrowed(tree.all(), box);
+        for (size_t first = begin; of_block.count > 0 && first < end; first += kGroupTriangles) {
+          const ProbeTree::Starts starts = tree.narrowed(of_block, boxes[(first - begin) / kGroupTriangles]);
+          for (size_t i = first; starts.count > 0 && i < std::min(first + kGroupTriangles, end); ++i)
+            test(tree, starts, triangles[i - begin], placed.first_triangle + static_cast<uint32_t>(i));
+        }
       });
     }
   }
 
-  void test(const ProbeTree& tree, uint32_t subtree, const std::array<DVec3, 3>& t, uint32_t number) {
+  void test(const ProbeTree& tree, const ProbeTree::Starts& starts, const std::array<DVec3, 3>& t, uint32_t number) {
     const DVec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
     const double least_facing = kMinFacing * glm::length(normal);
-    tree.visit(subtree, t, normal, [&](uint32_t i) {
+    tree.visit(starts, t, normal, [&](uint32_t i) {
       const Probe& probe = tree.probes()[i];
-      const VisiblePoint& point = points_[probe.point];
-      if (point.triangle == number) return;
+      if (probe.triangle == number) return;
       const double distance = hit_distance(probe, t, normal, least_facing);
-      if (distance >= kMinGapSteps * step_of(point) && distance <= probe.reach)
-        hits_.put(i, static_cast<float>(distance), number);
+      if (distance >= probe.least_gap && distance <= probe.reach) hits_.put(i, static_cast<float>(distance), number);
     });
   }
 
