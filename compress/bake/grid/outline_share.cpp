@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numbers>
+#include <numeric>
 #include <tuple>
 #include <vector>
 
@@ -15,6 +15,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint64_t kStars = 1024; // approximate number of sampled positions
+constexpr int kBucketBits = 10;
 
 /// A triangle's edge at a sampled position.
 struct StarEdge {
@@ -47,9 +48,7 @@ public:
   }
 
   double share() {
-    std::sort(edges_.begin(), edges_.end(), [](const StarEdge& a, const StarEdge& b) {
-      return std::tie(a.centre, a.end, a.outgoing) < std::tie(b.centre, b.end, b.outgoing);
-    });
+    sort();
     double outline = 0.0, all = 0.0;
     for (size_t begin = 0, end = 0; begin < edges_.size(); begin = end) {
       const StarEdge& first = edges_[begin];
@@ -66,6 +65,22 @@ public:
   }
 
 private:
+  /// Sorts edges by centre, end and direction. Keys are hashes, so their highest bits divide the edges evenly.
+  void sort() {
+    const auto bucket_of = [](const StarEdge& edge) { return edge.centre >> (64 - kBucketBits); };
+    std::vector<size_t> ends((size_t{1} << kBucketBits) + 1);
+    for (const StarEdge& edge : edges_) ++ends[bucket_of(edge) + 1];
+    std::partial_sum(ends.begin(), ends.end(), ends.begin());
+    std::vector<StarEdge> sorted(edges_.size());
+    for (const StarEdge& edge : edges_) sorted[ends[bucket_of(edge)]++] = edge;
+    edges_ = std::move(sorted);
+    const auto at = [&](size_t i) { return edges_.begin() + static_cast<std::ptrdiff_t>(i); };
+    for (size_t bucket = 0, begin = 0; begin < edges_.size(); begin = ends[bucket++])
+      std::sort(at(begin), at(ends[bucket]), [](const StarEdge& a, const StarEdge& b) {
+        return std::tie(a.centre, a.end, a.outgoing) < std::tie(b.centre, b.end, b.outgoing);
+      });
+  }
+
   void add_edge(DVec3 centre, DVec3 end, bool outgoing, DVec3 normal) {
     edges_.push_back({position_key(centre), position_key(end), outgoing, glm::distance(centre, end), normal});
   }

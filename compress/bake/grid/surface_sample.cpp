@@ -8,20 +8,24 @@ namespace {
 
 constexpr uint64_t kMaxLookedAt = uint64_t{1} << 20;
 
-/// Visits every stride-th triangle of the geometry, skipping triangles without area.
+/// Visits every stride-th triangle of the geometry.
+/// @param per_triangle takes a function that returns the triangle's corners
 template <typename PerTriangle>
 void for_each_triangle(const Scene& scene, const GeometryPlan& plan, uint64_t stride, const PerTriangle& per_triangle) {
   uint64_t skip = stride / 2;
   for (const GeometryPart& part : plan.parts) {
     const Mesh& mesh = scene.meshes[part.mesh];
+    const bool moved = part.geometry_from_mesh != DAffine(1.0);
     uint64_t i = skip;
-    for (; i < mesh.triangles.size(); i += stride) {
-      const Triangle& t = mesh.triangles[i];
-      DTriangle corners;
-      for (size_t corner = 0; corner < 3; ++corner)
-        corners[corner] = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[t[static_cast<int>(corner)]]));
-      if (const double area = area_of(corners); area > 0.0) per_triangle(corners, area);
-    }
+    for (; i < mesh.triangles.size(); i += stride)
+      per_triangle([&] {
+        DTriangle corners;
+        for (size_t corner = 0; corner < 3; ++corner) {
+          const DVec3 position(mesh.positions[mesh.triangles[i][static_cast<int>(corner)]]);
+          corners[corner] = moved ? transform_point(part.geometry_from_mesh, position) : position;
+        }
+        return corners;
+      });
     skip = i - mesh.triangles.size();
   }
 }
@@ -45,24 +49,33 @@ std::vector<SampleTriangle> sample_surface(const Scene& scene, const GeometryPla
   std::vector<SampleTriangle> sample;
   if (triangles <= max_count) {
     sample.reserve(triangles);
-    for_each_triangle(scene, plan, 1, [&](const DTriangle& t, double) { sample.push_back({t, 1.0}); });
+    for_each_triangle(scene, plan, 1, [&](const auto& corners) {
+      if (const DTriangle t = corners(); area_of(t) > 0.0) sample.push_back({t, 1.0});
+    });
     return sample;
   }
   const uint64_t stride = (triangles + kMaxLookedAt - 1) / kMaxLookedAt;
+  std::vector<double> areas;
+  areas.reserve(triangles / stride + 1);
+  for_each_triangle(scene, plan, stride, [&](const auto& corners) { areas.push_back(area_of(corners())); });
   double total_area = 0.0, count = 0.0;
-  for_each_triangle(scene, plan, stride, [&](const DTriangle&, double area) { total_area += area, count += 1.0; });
+  for (const double area : areas)
+    if (area > 0.0) total_area += area, count += 1.0;
   // Systematic sampling. Triangle i has the measure m_i = (area_i / total area + 1 / count) / 2, which sums to 1, and
   // marks lie at equal distances along the running sum. A triangle hit by n marks represents n / (m_i * marks)
   // triangles.
   const auto marks = static_cast<double>(max_count);
   double end = 0.5 / marks; // end of the running sum, relative to the next mark
-  for_each_triangle(scene, plan, stride, [&](const DTriangle& t, double area) {
+  size_t next = 0;
+  for_each_triangle(scene, plan, stride, [&](const auto& corners) {
+    const double area = areas[next++];
+    if (!(area > 0.0)) return;
     const double measure = 0.5 * (area / total_area + 1.0 / count);
     end += measure;
     const double hits = std::floor(end * marks);
     if (hits < 1.0) return;
     end -= hits / marks;
-    sample.push_back({t, static_cast<double>(stride) * hits / (measure * marks)});
+    sample.push_back({corners(), static_cast<double>(stride) * hits / (measure * marks)});
   });
   return sample;
 }
