@@ -35,13 +35,13 @@ private:
     const auto batches = static_cast<float>(whole_batches);
     std::fill_n(node.leaf_cost, kWidth, may_be_leaf ? node.area * (leaf_ + batch_ * batches) : kInfinity);
     float as_nodes = kInfinity;
-    if (node.count > 1) {
+    if (node.right != 0) {
       const RunNode &left = (&node)[1], &right = nodes_[node.right];
       join(left, right, node);
       as_nodes = left.node_cost + right.node_cost + extra_;
     }
     const float as_node = node.area * node_ + node.leaf_cost[kWidth - 1];
-    node.is_node = node.count == 1 || as_node <= as_nodes;
+    node.is_node = node.right == 0 || as_node <= as_nodes;
     node.node_cost = node.is_node ? as_node : as_nodes;
   }
 
@@ -71,7 +71,7 @@ private:
   /// Number of leaves on the left in the cheapest division of both sides into `slots` leaves; 0 if one leaf costs the
   /// same.
   uint32_t leaves_on_left(const RunNode& node, uint32_t slots) const {
-    if (node.count == 1 || node.leaf_cost[slots - 1] == node.leaf_cost[0]) return 0;
+    if (node.right == 0 || node.leaf_cost[slots - 1] == node.leaf_cost[0]) return 0;
     const RunNode &left = (&node)[1], &right = nodes_[node.right];
     uint32_t k = 1;
     while (left.leaf_cost[k - 1] + right.leaf_cost[slots - k - 1] != node.leaf_cost[slots - 1]) ++k;

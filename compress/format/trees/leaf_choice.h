@@ -1,10 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "compress/format/cluster/index_codec.h"
 #include "compress/format/trees/leaf_nodes.h"
 
 namespace packtrace {
@@ -49,8 +52,8 @@ inline float first_lane(const Float4& lanes) {
 /// Best split of a run of `count` triangles: the split with the least cost; of equal costs the one nearest to the
 /// middle.
 struct RunSplit {
-  float cost;
-  uint32_t left;
+  float cost = std::numeric_limits<float>::infinity();
+  uint32_t left = 1;
 
   void improve(float other, uint32_t at, uint32_t count) {
     const auto off_middle = [count](uint32_t split) {
@@ -60,10 +63,34 @@ struct RunSplit {
   }
 };
 
+/// Lowers `best` by the splits of a run of boxes.
+/// @param count 2..128
+/// @param box_at returns the box at a place of the run
+/// @return half the surface area of all boxes together
+template <typename BoxAt>
+float sweep_run(uint32_t count, const BoxAt& box_at, RunSplit& best) {
+  std::array<Float4, kMaxClusterTriangles> right_area;
+  FloatBox box = box_at(count - 1);
+  for (uint32_t i = count - 1; i > 0; --i) {
+    right_area[i] = half_area(box);
+    box.extend(box_at(i - 1));
+  }
+  const float area = first_lane(half_area(box));
+  box = box_at(0);
+  for (uint32_t i = 1; i < count; ++i) {
+    const Float4 left_cost = half_area(box) * static_cast<float>(i);
+    if (first_lane(left_cost) > best.cost) break; // the cost of the left side only grows
+    best.improve(first_lane(left_cost + right_area[i] * static_cast<float>(count - i)), i, count);
+    box.extend(box_at(i));
+  }
+  return area;
+}
+
 /// A node of a binary tree over runs of a cluster's triangles, stored in preorder: the left child is the next node.
 struct RunNode {
   float area;                                     ///< half the surface area of its box
-  uint8_t first, count, right;                    ///< run of triangles; number of the right child
+  uint8_t first, count;                           ///< run of triangles
+  uint8_t right;                                  ///< number of the right child; 0 without children
   bool is_node;                                   ///< cheaper as one PackedNode than split into nodes of both children
   float node_cost;                                ///< least cost of the run as one or several nodes
   alignas(16) float leaf_cost[baked::kNodeWidth]; ///< [i - 1]: least cost of the run as at most i leaves

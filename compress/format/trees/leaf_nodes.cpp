@@ -1,9 +1,7 @@
 #include "compress/format/trees/leaf_nodes.h"
 
 #include <cassert>
-#include <limits>
 
-#include "compress/format/cluster/index_codec.h"
 #include "compress/format/trees/leaf_choice.h"
 
 namespace packtrace {
@@ -21,25 +19,19 @@ public:
 private:
   void build(uint32_t first, uint32_t count) {
     const uint32_t number = size_++;
-    std::array<Float4, kMaxClusterTriangles> right_area;
-    FloatBox box = boxes_[first + count - 1];
-    for (uint32_t i = count - 1; i > 0; --i) {
-      right_area[i] = half_area(box);
-      box.extend(boxes_[first + i - 1]);
-    }
-    nodes_[number].area = first_lane(half_area(box));
-    nodes_[number].first = static_cast<uint8_t>(first), nodes_[number].count = static_cast<uint8_t>(count);
-    if (count == 1) return;
-    RunSplit best{std::numeric_limits<float>::infinity(), 1};
-    box = boxes_[first];
-    for (uint32_t i = 1; i < count; ++i) {
-      const Float4 left_cost = half_area(box) * static_cast<float>(i);
-      if (first_lane(left_cost) > best.cost) break; // the cost of the left side only grows
-      best.improve(first_lane(left_cost + right_area[i] * static_cast<float>(count - i)), i, count);
-      box.extend(boxes_[first + i]);
+    RunNode& node = nodes_[number];
+    node.first = static_cast<uint8_t>(first), node.count = static_cast<uint8_t>(count), node.right = 0;
+    RunSplit best; // two boxes have one split
+    if (count <= 2) {
+      FloatBox box = boxes_[first];
+      box.extend(boxes_[first + count - 1]);
+      node.area = first_lane(half_area(box));
+      if (count == 1) return;
+    } else {
+      node.area = sweep_run(count, [&](uint32_t i) { return boxes_[first + i]; }, best);
     }
     build(first, best.left);
-    nodes_[number].right = static_cast<uint8_t>(size_);
+    node.right = static_cast<uint8_t>(size_);
     build(first + best.left, count - best.left);
   }
 

@@ -4,15 +4,14 @@
 #include <array>
 #include <bit>
 #include <cstring>
-#include <limits>
 
-#include "compress/format/cluster/index_codec.h"
 #include "compress/format/trees/leaf_choice.h"
 
 namespace packtrace {
 namespace {
 
 constexpr double kExtraGroup = 0.5;      ///< value of TreeCosts::extra_node: strips also end where groups do
+constexpr uint32_t kUndivided = 2;       ///< splits of so few triangles do not improve the trees
 constexpr uint32_t kCoordinateBits = 24; ///< integers below 2^24 are exact in floats
 
 /// Boxes of triangles in integer coordinates below 2^kCoordinateBits. Points that are farther apart are put on a
@@ -46,8 +45,8 @@ private:
   std::array<FloatBox, kMaxClusterVertices> boxes_;
 };
 
-/// A binary tree over boxes in any order. Each node takes the split with the lowest surface area heuristic cost, of all
-/// splits by the boxes' centres along an axis.
+/// A binary tree over boxes in any order. Each node of more than kUndivided boxes takes the split with the lowest
+/// surface area heuristic cost, of all splits by the boxes' centres along an axis.
 class SweepTree {
 public:
   /// @param triangles 1..128
@@ -88,47 +87,33 @@ private:
   void build(uint32_t first, uint32_t count) {
     const uint32_t number = size_++;
     RunNode& node = nodes_[number];
-    node.first = static_cast<uint8_t>(first), node.count = static_cast<uint8_t>(count);
-    FloatBox box = boxes_[order_[0][first]];
-    for (uint32_t i = 1; i < count; ++i) box.extend(boxes_[order_[0][first + i]]);
-    node.area = first_lane(half_area(box));
-    if (count == 1) return;
-    uint32_t left = 1; // a node of two boxes: any split is equal
-    if (count > 2) left = split(first, count);
+    node.first = static_cast<uint8_t>(first), node.count = static_cast<uint8_t>(count), node.right = 0;
+    if (count <= kUndivided) {
+      FloatBox box = boxes_[order_[0][first]];
+      for (uint32_t i = 1; i < count; ++i) box.extend(boxes_[order_[0][first + i]]);
+      node.area = first_lane(half_area(box));
+      return;
+    }
+    const uint32_t left = split(first, count, node.area);
     build(first, left);
     node.right = static_cast<uint8_t>(size_);
     build(first + left, count - left);
   }
 
   /// Finds the best split and partitions the boxes in all three orders. Returns the number of boxes on the left.
-  uint32_t split(uint32_t first, uint32_t count) {
-    RunSplit best{std::numeric_limits<float>::infinity(), 1};
+  uint32_t split(uint32_t first, uint32_t count, float& area) {
+    RunSplit best;
     size_t best_axis = 0;
-    for (size_t axis = 0; axis < 3; ++axis)
-      if (sweep(order_[axis].data() + first, count, best)) best_axis = axis;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const RunSplit before = best;
+      const uint8_t* const order = order_[axis].data() + first;
+      area = sweep_run(count, [&](uint32_t i) { return boxes_[order[i]]; }, best);
+      if (best.cost != before.cost || best.left != before.left) best_axis = axis;
+    }
     for (uint32_t i = 0; i < count; ++i) on_left_[order_[best_axis][first + i]] = i < best.left;
     for (size_t axis = 0; axis < 3; ++axis)
       if (axis != best_axis) partition(order_[axis].data() + first, count);
     return best.left;
-  }
-
-  /// Lowers `best` by the splits of one order. Returns whether it changed.
-  bool sweep(const uint8_t* order, uint32_t count, RunSplit& best) const {
-    std::array<Float4, kMaxClusterTriangles> right_area;
-    FloatBox box = boxes_[order[count - 1]];
-    for (uint32_t i = count - 1; i > 0; --i) {
-      right_area[i] = half_area(box);
-      box.extend(boxes_[order[i - 1]]);
-    }
-    const RunSplit before = best;
-    box = boxes_[order[0]];
-    for (uint32_t i = 1; i < count; ++i) {
-      const Float4 left_cost = half_area(box) * static_cast<float>(i);
-      if (first_lane(left_cost) > best.cost) break; // the cost of the left side only grows
-      best.improve(first_lane(left_cost + right_area[i] * static_cast<float>(count - i)), i, count);
-      box.extend(boxes_[order[i]]);
-    }
-    return best.cost != before.cost || best.left != before.left;
   }
 
   void partition(uint8_t* order, uint32_t count) const {
