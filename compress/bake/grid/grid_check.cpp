@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,25 @@ DVec3 normal_of(const DTriangle& t) {
   return length > 0.0 ? normal / length : DVec3(0.0);
 }
 
+/// Returns the largest value such that all smaller ones together weigh less than `weight`; 0 if there is none.
+/// @param values pairs of value and weight; reordered
+double quantile(std::span<std::pair<double, double>> values, double weight) {
+  if (!(weight > 0.0)) return 0.0;
+  while (values.size() > 1) {
+    const size_t half = values.size() / 2;
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(half), values.end());
+    double below = 0.0;
+    for (const auto& value : values.first(half)) below += value.second;
+    if (below < weight) {
+      weight -= below;
+      values = values.subspan(half);
+    } else {
+      values = values.first(half);
+    }
+  }
+  return values.empty() ? 0.0 : values[0].first;
+}
+
 } // namespace
 
 GridCheck check_grid(const GeometryView& view, const GeometryGrid& grid) {
@@ -28,9 +48,10 @@ GridCheck check_grid(const GeometryView& view, const GeometryGrid& grid) {
     const SampleTriangle& t = view.sample[i];
     const double weight = seen ? view.sample_pixels[i] : t.weight * area_of(t.corners);
     DTriangle lattice; // relative to the first corner; differences of lattice coordinates are exact
-    const LatticePoint first = grid.round(t.corners[0]);
+    LatticePoint first;
     for (size_t corner = 0; corner < 3; ++corner) {
       const LatticePoint q = grid.round(t.corners[corner]);
+      if (corner == 0) first = q;
       for (size_t axis = 0; axis < 3; ++axis) {
         const int a = static_cast<int>(axis);
         lattice[corner][a] = static_cast<double>(q[axis] - first[axis]);
@@ -49,14 +70,10 @@ GridCheck check_grid(const GeometryView& view, const GeometryGrid& grid) {
     }
   }
   if (seen && total > 0.0) check.collapsed = collapsed / total * view.best.coverage();
-  std::sort(tilts.begin(), tilts.end());
-  double sum = 0.0, below = 0.0;
-  for (const auto& [degrees, weight] : tilts) {
-    sum += degrees * weight;
-    if (below < 0.99 * kept) check.tilt_degrees = degrees;
-    below += weight;
-  }
+  double sum = 0.0;
+  for (const auto& [degrees, weight] : tilts) sum += degrees * weight;
   if (kept > 0.0) check.mean_tilt_degrees = sum / kept;
+  check.tilt_degrees = quantile(tilts, 0.99 * kept);
   return check;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace packtrace {
 namespace {
@@ -31,7 +32,8 @@ public:
 
   /// @return the pixels that the triangle covers, without the weight
   double add(const DTriangle& world, double weight) {
-    height_ = height_of(world);
+    whole_ = &world;
+    height_.reset();
     weight_ = weight;
     return cut(world, 0);
   }
@@ -48,7 +50,8 @@ private:
   double take(const DTriangle& piece, double pixels) {
     const double pixel = pixel_at((piece[0] + piece[1] + piece[2]) / 3.0);
     if (!(pixel > 0.0) || !(pixels > 0.0) || !std::isfinite(pixels)) return 0.0;
-    sums_.add(pixels * weight_, pixel, height_);
+    if (!height_) height_ = height_of(*whole_); // most triangles of most scenes are out of sight
+    sums_.add(pixels * weight_, pixel, *height_);
     ++pieces_;
     return pixels;
   }
@@ -90,7 +93,9 @@ private:
 
   const PrimaryCamera& camera_;
   ViewSums& sums_;
-  double weight_ = 1.0, height_ = 0.0;
+  const DTriangle* whole_ = nullptr;
+  std::optional<double> height_; // of the whole triangle
+  double weight_ = 1.0;
   uint32_t pieces_ = 0;
 };
 
