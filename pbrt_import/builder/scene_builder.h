@@ -138,7 +138,8 @@ private:
   const CheckCancelledFn check_cancelled_;
   NameTable mesh_keys_;                     ///< values of MeshJob::same_as
   std::vector<uint32_t> mesh_slots_by_key_; ///< index into Scene::meshes, by number in mesh_keys_
-  std::string mesh_name_;                   ///< scratch buffer
+  std::string shape_kind_;                  ///< of the last shape, as in ImportStatistics::shapes
+  uint64_t* shape_count_ = nullptr;         ///< its count
   MemoryReservation mesh_memory_;           ///< for large meshes made from text, reserved one by one
   MemoryReservation kept_memory_;           ///< for all other data kept of directives, reserved in steps
   uint64_t kept_bytes_ = 0;

@@ -2,6 +2,8 @@
 #include "pbrt_import/builder/scene_builder.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cstdlib>
 
 #include "pbrt_import/builder/outer_sides.h"
@@ -25,7 +27,11 @@ constexpr uint64_t kMeshBytes = 128;          ///< for a mesh's name and the rou
 void SceneBuilder::add_shape(Directive& directive) {
   const std::string& kind = directive.names[0];
   const bool known = kind == "plymesh" || find_shape_kind(kind);
-  ++statistics_.shapes[known ? kind : "unknown"];
+  if (!shape_count_ || shape_kind_ != (known ? kind : "unknown")) {
+    shape_kind_ = known ? kind : "unknown";
+    shape_count_ = &statistics_.shapes[shape_kind_];
+  }
+  ++*shape_count_;
   Shape shape;
   const Placement placement = place(directive, "shape");
   shape.parent_from_mesh = placement.map;
@@ -217,8 +223,12 @@ bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
 }
 
 void SceneBuilder::name_mesh(Mesh& mesh, std::string_view kind, const Place& place) {
-  mesh_name_.assign(kind).append(":").append(std::to_string(place.line));
-  mesh.name = std::string(mesh_name_); // without spare capacity, as there may be many meshes
+  constexpr size_t kKindBytes = 32, kLineBytes = 12; // at most
+  std::array<char, kKindBytes + kLineBytes> name;
+  const size_t length = kind.copy(name.data(), kKindBytes);
+  name[length] = ':';
+  const std::to_chars_result end = std::to_chars(name.data() + length + 1, name.data() + name.size(), place.line);
+  mesh.name = std::string(name.data(), end.ptr); // without spare capacity, as there may be many
 }
 
 /// Waits for the queued meshes and stores them. A mesh that could not be made stays empty.

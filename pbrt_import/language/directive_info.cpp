@@ -1,11 +1,11 @@
 #include "pbrt_import/language/directive_info.h"
 
 #include <array>
-#include <cstring>
 #include <iterator>
 #include <vector>
 
 #include "pbrt_import/base/closest_name.h"
+#include "pbrt_import/base/equal_text.h"
 
 namespace packtrace {
 namespace {
@@ -73,30 +73,13 @@ constexpr std::array<uint8_t, kSlots> make_slots() {
   return slots;
 }
 
-/// a == b without a call of memcmp, which takes longer for short words.
-bool equal_words(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  const auto differ = [&](size_t at, auto word) {
-    auto other = word;
-    std::memcpy(&word, a.data() + at, sizeof word);
-    std::memcpy(&other, b.data() + at, sizeof other);
-    return word != other;
-  };
-  const size_t size = a.size();
-  if (size < sizeof(uint64_t))
-    return size < sizeof(uint32_t) ? a == b : !differ(0, uint32_t{0}) && !differ(size - sizeof(uint32_t), uint32_t{0});
-  for (size_t at = 0; at + sizeof(uint64_t) < size; at += sizeof(uint64_t))
-    if (differ(at, uint64_t{0})) return false;
-  return !differ(size - sizeof(uint64_t), uint64_t{0});
-}
-
 } // namespace
 
 const DirectiveInfo* find_directive(std::string_view keyword) {
   static constexpr std::array<uint8_t, kSlots> kSlotTable = make_slots();
   if (keyword.empty()) return nullptr;
   for (size_t slot = slot_of(keyword); kSlotTable[slot] != 0; slot = (slot + 1) % kSlots)
-    if (equal_words(kInfos[kSlotTable[slot] - 1].keyword, keyword)) return &kInfos[kSlotTable[slot] - 1];
+    if (equal_text(kInfos[kSlotTable[slot] - 1].keyword, keyword)) return &kInfos[kSlotTable[slot] - 1];
   return nullptr;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "pbrt_import/base/equal_text.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
@@ -66,41 +67,42 @@ std::string describe(const Parameter& parameter) {
 
 const Parameter* ParameterList::keep() {
   constexpr size_t kLinearSearch = 32;
-  Parameter& last = parameters_.back();
+  Parameter& last = this->last();
   types_ |= bit_of(last.type);
   Parameter* same = nullptr;
-  if (parameters_.size() <= kLinearSearch + 1) {
-    for (Parameter& existing : std::span(parameters_).first(parameters_.size() - 1))
-      if (existing.type == last.type && existing.name == last.name) same = &existing;
+  if (count_ <= kLinearSearch + 1) {
+    for (Parameter& existing : std::span(parameters_).first(count_ - 1))
+      if (existing.type == last.type && equal_text(existing.name, last.name)) same = &existing;
   } else { // only hostile scenes have so many parameters
     const auto key = [](const Parameter& parameter) { return static_cast<char>(parameter.type) + parameter.name; };
     if (index_.empty())
-      for (size_t i = 0; i + 1 < parameters_.size(); ++i) index_.emplace(key(parameters_[i]), i);
-    const auto [found, inserted] = index_.try_emplace(key(last), parameters_.size() - 1);
+      for (size_t i = 0; i + 1 < count_; ++i) index_.emplace(key(parameters_[i]), i);
+    const auto [found, inserted] = index_.try_emplace(key(last), count_ - 1);
     if (!inserted) same = &parameters_[found->second];
   }
   if (!same) return nullptr;
-  *same = std::move(last);
-  parameters_.pop_back();
+  std::swap(*same, last);
+  drop();
   return same;
 }
 
 const Parameter* ParameterList::find_type_in(uint32_t type_bits, std::string_view name) const {
   looked_up_.push_back(name);
   if ((types_ & type_bits) == 0) return nullptr;
-  for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it)
-    if ((type_bits & bit_of(it->type)) != 0 && it->name == name) {
-      it->used = true;
-      return &*it;
-    }
+  for (size_t i = count_; i-- > 0;) {
+    const Parameter& parameter = parameters_[i];
+    if ((type_bits & bit_of(parameter.type)) == 0 || !equal_text(parameter.name, name)) continue;
+    parameter.used = true;
+    return &parameter;
+  }
   return nullptr;
 }
 
 const Parameter* ParameterList::peek(std::string_view name, ParameterType type) const {
   if ((types_ & bit_of(type)) == 0) return nullptr;
-  const auto found = std::find_if(parameters_.begin(), parameters_.end(),
-                                  [&](const Parameter& p) { return p.type == type && p.name == name; });
-  return found == parameters_.end() ? nullptr : &*found;
+  for (const Parameter& parameter : all())
+    if (parameter.type == type && equal_text(parameter.name, name)) return &parameter;
+  return nullptr;
 }
 
 float ParameterList::get_float(std::string_view name, float fallback) const {
@@ -153,8 +155,8 @@ std::vector<Triangle> ParameterList::take_triangles(std::string_view name) {
 
 void ParameterList::mark_used(std::span<const std::string_view> names) const {
   looked_up_.insert(looked_up_.end(), names.begin(), names.end());
-  for (const Parameter& parameter : parameters_)
-    if (std::find(names.begin(), names.end(), parameter.name) != names.end()) parameter.used = true;
+  for (const Parameter& parameter : all())
+    for (const std::string_view name : names) parameter.used = parameter.used || equal_text(parameter.name, name);
 }
 
 bool ParameterList::was_looked_up(std::string_view name) const {

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "pbrt_import/base/closest_name.h"
@@ -54,6 +55,15 @@ struct Parameter {
   IntegerArray integers;            ///< values of integer; of bool as 0 or 1
   std::vector<std::string> strings; ///< string, texture and spectrum file names, escapes not yet replaced
   mutable bool used = false;        ///< whether it was looked up with its type
+
+  /// Removes the values, but keeps small blocks of memory for the next ones.
+  void clear() {
+    constexpr size_t kSmall = 64;
+    if (strings.capacity() > kSmall) strings = {};
+    if (name.capacity() > kSmall) name = {};
+    floats.clear(), integers.clear(), strings.clear();
+    used = false;
+  }
 };
 
 /// The parameter as `"type name"` for messages.
@@ -63,20 +73,36 @@ std::string describe(const Parameter& parameter);
 /// as used; unused parameters are reported as mistakes of the scene.
 class ParameterList {
 public:
-  /// Appends a parameter, which is filled in through last(). Then call keep() or drop().
-  Parameter& append() { return parameters_.emplace_back(); }
-  Parameter& last() { return parameters_.back(); }
+  ParameterList() = default;
+  ParameterList(const ParameterList& other)
+      : parameters_(other.all().begin(), other.all().end()), count_(other.count_), index_(other.index_),
+        types_(other.types_), looked_up_(other.looked_up_) {}
+  ParameterList(ParameterList&& other) noexcept { swap(other); }
+  ParameterList& operator=(ParameterList other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~ParameterList() = default;
+
+  /// Appends a parameter without values, which is filled in through last(). Then call keep() or drop().
+  Parameter& append() {
+    if (count_ == parameters_.size()) parameters_.emplace_back();
+    return parameters_[count_++];
+  }
+  Parameter& last() { return parameters_[count_ - 1]; }
   /// Keeps the last parameter. It replaces an earlier one of the same name and type.
   /// @return null if it replaces none; otherwise its new location
   const Parameter* keep();
-  void drop() { parameters_.pop_back(); }
+  void drop() { parameters_[--count_].clear(); }
   void clear() {
-    if (parameters_.empty() && looked_up_.empty()) return;
-    parameters_.clear(), looked_up_.clear(), types_ = 0;
+    constexpr size_t kKeptForReuse = 32;
+    if (parameters_.size() > kKeptForReuse) parameters_ = {}, count_ = 0;
+    while (count_ > 0) drop();
+    looked_up_.clear(), types_ = 0;
     if (!index_.empty()) index_ = {}; // also frees its buckets
   }
-  bool empty() const { return parameters_.empty(); }
-  std::span<const Parameter> all() const { return parameters_; }
+  bool empty() const { return count_ == 0; }
+  std::span<const Parameter> all() const { return {parameters_.data(), count_}; }
 
   /// Finds a parameter by name with one of the types and marks it as used; null if there is none.
   const Parameter* find(std::string_view name, std::initializer_list<ParameterType> types) const {
@@ -114,7 +140,16 @@ private:
   static constexpr uint32_t bit_of(ParameterType type) { return 1u << static_cast<uint32_t>(type); }
   const Parameter* find_type_in(uint32_t type_bits, std::string_view name) const;
 
-  std::vector<Parameter> parameters_;
+  void swap(ParameterList& other) noexcept {
+    parameters_.swap(other.parameters_);
+    std::swap(count_, other.count_);
+    index_.swap(other.index_);
+    std::swap(types_, other.types_);
+    looked_up_.swap(other.looked_up_);
+  }
+
+  std::vector<Parameter> parameters_; ///< those from count_ on have no values and are there for reuse
+  size_t count_ = 0;
   std::unordered_map<std::string, size_t> index_;   ///< index into parameters_ by type and name; empty for short lists
   uint32_t types_ = 0;                              ///< bit_of() of all parameters' types
   mutable std::vector<std::string_view> looked_up_; ///< names looked up, string literals, possibly with repeats

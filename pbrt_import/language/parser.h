@@ -57,6 +57,12 @@ private:
   bool take_plain_matrix(PlainText& text, uint32_t count, std::array<double, 16>& numbers);
   bool take_plain_parameters(ParameterList& list);
   bool take_plain_parameter(ParameterList& list);
+  struct PlainDeclaration {
+    std::string text; ///< empty: none
+    ParameterType type = ParameterType::kFloat;
+    size_t name_begin = 0; ///< offset in text
+  };
+  const PlainDeclaration* plain_declaration(std::string_view text);
   bool take_plain_value(PlainText& text, Parameter& parameter);
   void begin(Directive& directive, const DirectiveInfo& info, const Place& place);
   bool read_arguments(const DirectiveInfo& info, Directive& directive);
@@ -106,8 +112,9 @@ private:
   std::optional<Declaration>
       misread_declaration_; ///< a declaration that was read as the value of the previous parameter
   MemoryBudget memory_;
-  Directive* directive_ = nullptr; ///< the directive being read
-  uint64_t value_bytes_ = 0;       ///< bytes of its parameters
+  std::array<PlainDeclaration, 64> declarations_; ///< the last ones, by a hash of their text
+  Directive* directive_ = nullptr;                ///< the directive being read
+  uint64_t value_bytes_ = 0;                      ///< bytes of its parameters
 };
 
 } // namespace packtrace

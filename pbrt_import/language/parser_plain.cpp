@@ -4,19 +4,15 @@
 #include <algorithm>
 #include <tuple>
 
+#include "pbrt_import/base/equal_text.h"
 #include "pbrt_import/language/parser.h"
 #include "pbrt_import/language/token_text.h"
 
 namespace packtrace {
 namespace {
 
-/// Splits `type name`; false if there are other words or blanks.
-bool split_plain_declaration(std::string_view text, std::string_view& type, std::string_view& name) {
-  const size_t gap = text.find(' ');
-  if (gap == text.npos) return false;
-  type = text.substr(0, gap);
-  name = text.substr(gap + 1);
-  return !type.empty() && !name.empty() && name.find_first_of(" \t") == name.npos && type.find('\t') == type.npos;
+bool has_gap(std::string_view text) {
+  return std::any_of(text.begin(), text.end(), [](char c) { return c == ' ' || c == '\t'; });
 }
 
 } // namespace
@@ -69,24 +65,40 @@ bool Parser::take_plain_parameters(ParameterList& list) {
   return find_directive(source_.plain_text().peek_word()) != nullptr;
 }
 
+/// Type and name in a declaration of one type and one name with one space between them; null for others.
+const Parser::PlainDeclaration* Parser::plain_declaration(std::string_view text) {
+  if (text.empty()) return nullptr;
+  const auto letter = [&](size_t i) { return static_cast<size_t>(static_cast<unsigned char>(text[i])); };
+  PlainDeclaration& known =
+      declarations_[(letter(0) * 5 + letter(text.size() - 1) * 3 + text.size()) % declarations_.size()];
+  if (equal_text(known.text, text)) return &known;
+  const size_t gap = text.find(' ');
+  if (gap == text.npos || gap + 1 == text.size() || has_gap(text.substr(gap + 1))) return nullptr;
+  const std::optional<ParameterType> type = parameter_type(text.substr(0, gap));
+  constexpr size_t kLong = 64; // few are longer, and they need not be kept
+  if (!type || text.size() > kLong) return nullptr;
+  known = {std::string(text), *type, gap + 1};
+  return &known;
+}
+
 /// Reads a parameter, if it has the common form.
 bool Parser::take_plain_parameter(ParameterList& list) {
   PlainText text = source_.plain_text();
-  std::string_view declaration, type_name, name;
-  if (!text.take_string(declaration) || !split_plain_declaration(declaration, type_name, name)) return false;
-  const std::optional<ParameterType> type = parameter_type(type_name);
-  if (!type) return false;
+  std::string_view declaration;
+  if (!text.take_string(declaration)) return false;
+  const PlainDeclaration* const known = plain_declaration(declaration);
+  if (!known) return false;
   const Place place{source_.file(), text.token_line(), text.token_column()};
   const uint64_t before = value_bytes_;
   value_bytes_ += kParameterBytes + declaration.size();
   Parameter& parameter = list.append();
-  parameter.type = *type;
+  parameter.type = known->type;
   if (!take_plain_value(text, parameter) || value_bytes_ > kFreeBytes) {
     list.drop();
     value_bytes_ = before;
     return false;
   }
-  parameter.name = name;
+  parameter.name = declaration.substr(known->name_begin);
   parameter.place = place;
   source_.accept(text);
   keep_last(list);
@@ -103,7 +115,7 @@ bool Parser::take_plain_value(PlainText& text, Parameter& parameter) {
   case ParameterType::kTexture: {
     std::string_view value;
     // A value with a gap might be the declaration of another parameter.
-    if (!text.take_string(value) || value.find_first_of(" \t") != value.npos) return false;
+    if (!text.take_string(value) || has_gap(value)) return false;
     if (array && !text.take(']')) return false;
     value_bytes_ += 2 * sizeof(std::string) + value.size();
     parameter.strings.emplace_back(value);

@@ -67,14 +67,13 @@ double largest_coordinate(const Bounds& box) {
 
 class Mover {
 public:
-  Mover(Scene& scene, const AddResidual& add_residual) : scene_(scene), add_residual_(add_residual) {
-    meshes_.reserve(scene.meshes.size());
-    for (const Mesh& mesh : scene.meshes) meshes_.push_back(bounds_of(mesh.positions));
-  }
+  Mover(Scene& scene, const AddResidual& add_residual) : scene_(scene), add_residual_(add_residual) {}
 
   void run() {
+    if (!scene_.objects.empty() || scene_.shapes.size() > scene_.meshes.size()) find_mesh_boxes();
     objects_moved_ = move_objects();
     if (!objects_moved_ && surely_near()) return;
+    if (meshes_.empty()) find_mesh_boxes();
     Bounds world = bounds_of_shapes(scene_.shapes, meshes_);
     for (size_t i = 0; i < scene_.instances.size(); ++i)
       world.extend(transform_bounds(map(i), object_boxes_[scene_.instances[i].object]));
@@ -86,6 +85,11 @@ public:
   }
 
 private:
+  void find_mesh_boxes() {
+    meshes_.reserve(scene_.meshes.size());
+    for (const Mesh& mesh : scene_.meshes) meshes_.push_back(bounds_of(mesh.positions));
+  }
+
   /// True only if the world need not be moved: told from the instances' translations and how far they reach at most,
   /// because the boxes of a million instances take longer than reading them.
   bool surely_near() const {
@@ -97,7 +101,8 @@ private:
     Bounds shapes;
     for (const Shape& shape : scene_.shapes) {
       const DAffine& map = shape.parent_from_mesh;
-      const Bounds& box = meshes_[shape.mesh];
+      // Boxes are kept where shapes share meshes.
+      const Bounds box = meshes_.empty() ? bounds_of(scene_.meshes[shape.mesh].positions) : meshes_[shape.mesh];
       const bool moves_only = glm::dmat3(map) == glm::dmat3(1.0); // then corners need no products
       shapes.extend(moves_only ? Bounds{box.lo + map[3], box.hi + map[3]} : transform_bounds(map, box));
     }
@@ -187,7 +192,8 @@ private:
 
   Scene& scene_;
   const AddResidual& add_residual_; ///< as in move_far_world()
-  std::vector<Bounds> meshes_, object_boxes_;
+  std::vector<Bounds> meshes_;      ///< empty until they are needed
+  std::vector<Bounds> object_boxes_;
   std::vector<DVec3> zeros_;   ///< by object: the point that becomes its zero
   bool objects_moved_ = false; ///< whether a zero differs from 0; then map() applies them
   std::map<std::pair<uint32_t, std::array<double, 3>>, uint32_t> animations_;

@@ -209,12 +209,13 @@ void check_count(std::vector<T>& attribute, size_t vertex_count, std::string_vie
 } // namespace
 
 bool is_clean(const Mesh& mesh) {
-  constexpr size_t kMaxVertices = 512;
+  constexpr size_t kMaxVertices = 511;
   const std::vector<Vec3>& p = mesh.positions;
   const auto fits = [&](size_t count) { return count == 0 || count == p.size(); };
   if (p.size() > kMaxVertices || mesh.triangles.empty() || !fits(mesh.normals.size()) || !fits(mesh.uvs.size()))
     return false;
-  std::array<uint64_t, kMaxVertices / 64> used{};
+  std::array<uint64_t, kMaxVertices / 64 + 1> used;
+  std::fill_n(used.begin(), p.size() / 64 + 1, uint64_t{0});
   for (const Triangle& t : mesh.triangles) {
     if (t.x >= p.size() || t.y >= p.size() || t.z >= p.size()) return false;
     // Equal indices have equal positions. NaN differ, but are not finite.
@@ -222,10 +223,13 @@ bool is_clean(const Mesh& mesh) {
     if (t.x == t.y || t.y == t.z || t.z == t.x) return false;
     for (const uint32_t vertex : {t.x, t.y, t.z}) used[vertex / 64] |= uint64_t{1} << vertex % 64;
   }
-  size_t used_count = 0;
-  for (const uint64_t word : used) used_count += static_cast<size_t>(std::popcount(word));
+  const auto all_used = [&] {
+    for (size_t word = 0; word < p.size() / 64; ++word)
+      if (~used[word] != 0) return false;
+    return used[p.size() / 64] == (uint64_t{1} << p.size() % 64) - 1;
+  };
   const auto finite_uv = [](Vec2 uv) { return std::isfinite(uv.x) && std::isfinite(uv.y); };
-  return used_count == p.size() && all_finite(p) && std::all_of(mesh.normals.begin(), mesh.normals.end(), is_unit) &&
+  return all_used() && all_finite(p) && std::all_of(mesh.normals.begin(), mesh.normals.end(), is_unit) &&
          std::all_of(mesh.uvs.begin(), mesh.uvs.end(), finite_uv);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -39,13 +40,15 @@ void reserve_large(std::vector<T>& elements, size_t capacity) {
   elements = std::move(larger);
 }
 
-/// Reserves room for at least one more element of an array that may grow large, by a factor of 16 or 4. Unused capacity
-/// costs address space only, whereas frequent growth costs time for copies and memory for the second array.
+/// Reserves room for at least one more element of an array that may grow large: by a factor of 16 while there are few,
+/// or to a million small ones, then by a factor of 4. Unused capacity costs address space only, whereas frequent growth
+/// costs time for copies and memory for the second array.
 template <class T>
 void reserve_one_more(std::vector<T>& elements) {
-  constexpr size_t kFirst = 1024, kFew = 1u << 16;
-  if (elements.size() < elements.capacity()) return;
-  reserve_large(elements, elements.empty() ? kFirst : elements.size() * (elements.size() < kFew ? 16 : 4));
+  constexpr size_t kFirst = 1024, kFew = 1u << 14, kMany = sizeof(T) <= 64 ? 1u << 20 : 1u << 18;
+  const size_t size = elements.size();
+  if (size < elements.capacity()) return;
+  reserve_large(elements, size == 0 ? kFirst : size < kFew ? 16 * size : std::max(4 * size, kMany));
 }
 
 } // namespace packtrace

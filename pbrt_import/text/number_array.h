@@ -45,6 +45,14 @@ public:
     triplets_.resize((size + 2) / 3);
   }
 
+  /// Empties the array and gives back its memory, unless it is small.
+  void clear() {
+    constexpr size_t kSmall = 256;
+    if (triplets_.capacity() > kSmall) triplets_ = {};
+    triplets_.clear();
+    size_ = 0;
+  }
+
   /// Moves out all complete groups of three and leaves the array empty.
   std::vector<Triplet> take_triplets() {
     triplets_.resize(size_ / 3);

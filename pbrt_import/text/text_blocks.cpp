@@ -138,22 +138,34 @@ private:
       run.line_ends += how_many;
       run.line_start = offset_of(last) + 1;
     };
-    const auto scan_one = [&] {
+    const auto scan_one = [&](T& value) {
       for (; p < end_ && is_space(*p); ++p)
         if (*p == '\n' || (*p == '\r' && p[1] != '\n')) add_line_ends(1, p);
       if (p < end_ && detail::is_digit(*p) && ends_word(p[1])) { // the common case in short arrays
-        chunk[count++] = static_cast<T>(*p++ - '0');
+        value = static_cast<T>(*p++ - '0');
         return true;
       }
-      const char* const end = p < end_ ? scan(p, chunk[count]) : nullptr;
+      const char* const end = p < end_ ? scan(p, value) : nullptr;
       if (!end) return false;
       p = end;
-      ++count;
       return true;
     };
-    // Starting a kernel does not pay off for short arrays.
+    const auto finish = [&] {
+      position_ = p;
+      run.end = offset_of(p);
+      run.count = static_cast<uint32_t>(values.size()) - run.first;
+      return run;
+    };
+    // Starting a kernel does not pay off for short arrays, which have fewer numbers than bytes.
     constexpr size_t kShortArray = 48;
-    if (std::memchr(p, ']', kShortArray)) kernel = nullptr;
+    if (std::memchr(p, ']', kShortArray)) {
+      values.resize(run.first + kShortArray);
+      T* next = values.data() + run.first;
+      while (scan_one(*next)) ++next;
+      values.resize(static_cast<size_t>(next - values.data()));
+      return finish();
+    }
+    bool more = true;
     do {
       if (kernel && p - text_ >= static_cast<std::ptrdiff_t>(kKernelLead)) {
         const NumberBatch batch = kernel(p, end_, chunk + count, kChunk - count);
@@ -165,12 +177,11 @@ private:
         values.insert(values.end(), chunk, chunk + count);
         count = 0;
       }
-    } while (scan_one());
+      more = scan_one(chunk[count]);
+      count += more;
+    } while (more);
     values.insert(values.end(), chunk, chunk + count);
-    position_ = p;
-    run.end = offset_of(p);
-    run.count = static_cast<uint32_t>(values.size()) - run.first;
-    return run;
+    return finish();
   }
 
   uint64_t offset_of(const char* p) const { return block_.offset + static_cast<uint64_t>(p - text_); }

@@ -77,5 +77,47 @@ TEST(ClosestName, FindsTyposButNotOtherWords) {
   EXPECT_EQ(closest_name(std::string(100'000, 'x'), names), "");
 }
 
+/// Appends and keeps a parameter with one value.
+void append(ParameterList& list, std::string name, float value) {
+  Parameter& parameter = list.append();
+  parameter.type = ParameterType::kFloat;
+  parameter.name = std::move(name);
+  parameter.floats.push_back(value);
+  list.keep();
+}
+
+TEST(ParameterList, ReusedParametersStartWithoutValues) {
+  ParameterList list;
+  append(list, "a", 1.0f);
+  list.last().strings.emplace_back("text");
+  EXPECT_EQ(list.get_float("b", 5.0f), 5.0f);
+  list.clear();
+  EXPECT_TRUE(list.empty());
+  EXPECT_EQ(list.find("a", {ParameterType::kFloat}), nullptr);
+  const Parameter& again = list.append();
+  EXPECT_TRUE(again.floats.empty() && again.integers.empty() && again.strings.empty() && !again.used);
+}
+
+TEST(ParameterList, CopiesAndMovesHaveTheirOwnParameters) {
+  ParameterList list;
+  append(list, "dropped", 0.0f);
+  list.clear();
+  append(list, "a", 1.0f);
+  append(list, "b", 2.0f);
+  append(list, "a", 3.0f); // replaces the first
+  ParameterList copy = list;
+  EXPECT_EQ(copy.all().size(), 2u);
+  EXPECT_EQ(copy.get_float("a", 0.0f), 3.0f);
+  const ParameterList moved = std::move(list);
+  EXPECT_EQ(moved.get_float("b", 0.0f), 2.0f);
+  list = {};
+  append(list, "c", 4.0f);
+  EXPECT_EQ(list.all().size(), 1u);
+  copy = list;
+  EXPECT_EQ(copy.get_float("c", 0.0f), 4.0f);
+  EXPECT_EQ(copy.get_float("a", 0.0f), 0.0f);
+  EXPECT_EQ(moved.all().size(), 2u);
+}
+
 } // namespace
 } // namespace packtrace
