@@ -138,34 +138,22 @@ private:
       run.line_ends += how_many;
       run.line_start = offset_of(last) + 1;
     };
-    const auto scan_one = [&](T& value) {
+    const auto scan_one = [&] {
       for (; p < end_ && is_space(*p); ++p)
         if (*p == '\n' || (*p == '\r' && p[1] != '\n')) add_line_ends(1, p);
       if (p < end_ && detail::is_digit(*p) && ends_word(p[1])) { // the common case in short arrays
-        value = static_cast<T>(*p++ - '0');
+        chunk[count++] = static_cast<T>(*p++ - '0');
         return true;
       }
-      const char* const end = p < end_ ? scan(p, value) : nullptr;
+      const char* const end = p < end_ ? scan(p, chunk[count]) : nullptr;
       if (!end) return false;
       p = end;
+      ++count;
       return true;
     };
-    const auto finish = [&] {
-      position_ = p;
-      run.end = offset_of(p);
-      run.count = static_cast<uint32_t>(values.size()) - run.first;
-      return run;
-    };
-    // Starting a kernel does not pay off for short arrays, which have fewer numbers than bytes.
+    // Starting a kernel does not pay off for short arrays.
     constexpr size_t kShortArray = 48;
-    if (std::memchr(p, ']', kShortArray)) {
-      values.resize(run.first + kShortArray);
-      T* next = values.data() + run.first;
-      while (scan_one(*next)) ++next;
-      values.resize(static_cast<size_t>(next - values.data()));
-      return finish();
-    }
-    bool more = true;
+    if (std::memchr(p, ']', kShortArray)) kernel = nullptr;
     do {
       if (kernel && p - text_ >= static_cast<std::ptrdiff_t>(kKernelLead)) {
         const NumberBatch batch = kernel(p, end_, chunk + count, kChunk - count);
@@ -177,11 +165,12 @@ private:
         values.insert(values.end(), chunk, chunk + count);
         count = 0;
       }
-      more = scan_one(chunk[count]);
-      count += more;
-    } while (more);
+    } while (scan_one());
     values.insert(values.end(), chunk, chunk + count);
-    return finish();
+    position_ = p;
+    run.end = offset_of(p);
+    run.count = static_cast<uint32_t>(values.size()) - run.first;
+    return run;
   }
 
   uint64_t offset_of(const char* p) const { return block_.offset + static_cast<uint64_t>(p - text_); }
