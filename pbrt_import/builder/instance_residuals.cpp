@@ -1,7 +1,8 @@
 #include "pbrt_import/builder/instance_residuals.h"
 
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <bit>
 
 #include "pbrt_import/text/large_pages.h"
 
@@ -12,8 +13,8 @@ namespace {
 /// Whether all components are +0.
 template <class T>
 bool is_plus_zero(const T& value) {
-  const T zero(0.0f);
-  return std::memcmp(&value, &zero, sizeof value) == 0;
+  using Bits = std::array<uint32_t, sizeof(T) / sizeof(float)>;
+  return std::bit_cast<Bits>(value) == Bits{};
 }
 
 } // namespace

@@ -1,6 +1,7 @@
 // The part of SceneBuilder that deals with worlds, blocks, objects and instances.
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <bit>
 
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/builder/scene_builder.h"
@@ -134,8 +135,9 @@ void SceneBuilder::add_instance(const Directive& directive) {
 bool SceneBuilder::check_instance(const Directive& directive, const Affine& world_from_object) {
   if (is_finite(world_from_object[3])) {
     // Long rows of instances only differ in their translations, so bits are compared first.
-    if (std::memcmp(&world_from_object, &sound_linear_, sizeof sound_linear_) == 0) return true;
+    using Bits = std::array<uint32_t, 9>;
     const glm::mat3 linear(world_from_object);
+    if (std::bit_cast<Bits>(linear) == std::bit_cast<Bits>(sound_linear_)) return true;
     if (is_sound(glm::dmat3(linear))) {
       sound_linear_ = linear;
       return true;
