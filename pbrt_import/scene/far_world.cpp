@@ -19,12 +19,17 @@ namespace {
 /// picture.
 constexpr double kFarWorld = 256.0, kFarObject = 4096.0;
 
+/// By absolute value.
+double largest_coordinate(const Bounds& box) {
+  const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  return std::max({far.x, far.y, far.z});
+}
+
 /// Returns the point near a box's centre that becomes the new zero; 0 if the box lies within `limit` of its diagonals
 /// from zero.
 DVec3 new_zero(const Bounds& box, double limit) {
   if (box.empty()) return DVec3(0.0);
-  const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
-  const double distance = std::max({far.x, far.y, far.z}), diagonal = box.diagonal();
+  const double distance = largest_coordinate(box), diagonal = box.diagonal();
   if (!std::isfinite(distance) || !(distance > limit * diagonal)) return DVec3(0.0);
   // A multiple of a power of two has few bits, so subtracting it is exact. Without an extent, the zero is the box's
   // centre.
@@ -42,10 +47,10 @@ DAffine moved(DAffine map, DVec3 by) {
 
 using AddResidual = std::function<void(size_t instance, DAffine& map)>;
 
-/// What bounds the places of all instances: their translations, and how far a point of one is from its translation.
+/// Bounds of the translations of all instances, and of the distance between an instance's translation and its points.
 struct Spread {
   Bounds translations;
-  double radius = 0.0; ///< on each axis
+  double radius = 0.0; ///< largest distance along an axis
 };
 
 /// @param object_radius largest coordinate, by absolute value, of a point of an object in its own space
@@ -58,11 +63,6 @@ Spread spread_of(std::span<const Instance> instances, double object_radius) {
   }
   const double factor = double{std::max({largest.x, largest.y, largest.z})};
   return {{DVec3(lo), DVec3(hi)}, 3.0 * factor * object_radius};
-}
-
-double largest_coordinate(const Bounds& box) {
-  const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
-  return std::max({far.x, far.y, far.z});
 }
 
 class Mover {
@@ -90,8 +90,8 @@ private:
     for (const Mesh& mesh : scene_.meshes) meshes_.push_back(bounds_of(mesh.positions));
   }
 
-  /// True only if the world need not be moved: told from the instances' translations and how far they reach at most,
-  /// because the boxes of a million instances take longer than reading them.
+  /// A fast sufficient test: if it is true, the world need not be moved. It bounds all instances together, because
+  /// computing the boxes of a million instances takes longer than reading them.
   bool surely_near() const {
     double object_radius = 0.0;
     for (const Bounds& box : object_boxes_) {
@@ -101,7 +101,7 @@ private:
     Bounds shapes;
     for (const Shape& shape : scene_.shapes) {
       const DAffine& map = shape.parent_from_mesh;
-      // Boxes are kept where shapes share meshes.
+      // run() has computed the boxes of all meshes if several shapes may use one.
       const Bounds box = meshes_.empty() ? bounds_of(scene_.meshes[shape.mesh].positions) : meshes_[shape.mesh];
       const bool moves_only = glm::dmat3(map) == glm::dmat3(1.0); // then corners need no products
       shapes.extend(moves_only ? Bounds{box.lo + map[3], box.hi + map[3]} : transform_bounds(map, box));

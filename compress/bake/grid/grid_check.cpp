@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <utility>
 #include <vector>
 
+#include "pbrt_import/base/weighted_quantile.h"
 #include "pbrt_import/scene/angle.h"
 
 namespace packtrace {
@@ -15,25 +15,6 @@ DVec3 normal_of(const DTriangle& t) {
   const DVec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
   const double length = glm::length(normal);
   return length > 0.0 ? normal / length : DVec3(0.0);
-}
-
-/// Returns the largest value such that all smaller ones together weigh less than `weight`; 0 if there is none.
-/// @param values pairs of value and weight; reordered
-double quantile(std::span<std::pair<double, double>> values, double weight) {
-  if (!(weight > 0.0)) return 0.0;
-  while (values.size() > 1) {
-    const size_t half = values.size() / 2;
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(half), values.end());
-    double below = 0.0;
-    for (const auto& value : values.first(half)) below += value.second;
-    if (below < weight) {
-      weight -= below;
-      values = values.subspan(half);
-    } else {
-      values = values.first(half);
-    }
-  }
-  return values.empty() ? 0.0 : values[0].first;
 }
 
 } // namespace
@@ -73,7 +54,7 @@ GridCheck check_grid(const GeometryView& view, const GeometryGrid& grid) {
   double sum = 0.0;
   for (const auto& [degrees, weight] : tilts) sum += degrees * weight;
   if (kept > 0.0) check.mean_tilt_degrees = sum / kept;
-  check.tilt_degrees = quantile(tilts, 0.99 * kept);
+  check.tilt_degrees = weighted_quantile(tilts, 0.99 * kept);
   return check;
 }
 

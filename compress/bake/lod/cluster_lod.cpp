@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -12,6 +14,8 @@
 #include "compress/bake/lod/lod_group_builder.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/base/weighted_quantile.h"
+#include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 namespace {
@@ -25,7 +29,7 @@ constexpr uint64_t kManyTriangles = 2048;
 // clusters.
 constexpr uint64_t kFewTriangles = 512;
 constexpr double kKeptWhenFew = 0.25;
-// A group is lost if its error is larger than these shares of its radius and of the median group's error.
+// A group is lost if its error exceeds both of these multiples: of its radius, and of the median group's error.
 constexpr double kLossOverRadius = 0.25, kLossOverMedian = 4.0;
 constexpr uint64_t kCoarsest = 16;        // levels with at most this many triangles are the last
 constexpr double kInflation = 1.0 + 1e-6; // of bounding spheres, to cover rounding errors
@@ -192,16 +196,13 @@ private:
   /// few triangles that touch no other group, such as a floor of two, are such groups. Clusters are grouped with others
   /// later, and errors never decrease, so one such error would bind the whole surface in all levels above.
   void keep_lost(const std::vector<std::vector<uint32_t>>& members, std::vector<SimplifiedGroup>& results) const {
-    std::vector<std::pair<double, uint64_t>> errors; // and triangles
-    uint64_t all = 0, passed = 0;
-    for (const SimplifiedGroup& r : results)
-      errors.emplace_back(r.error, r.source_triangles), all += r.source_triangles;
-    std::sort(errors.begin(), errors.end());
-    double median = 0.0;
-    for (const auto& [error, triangles] : errors) {
-      median = error, passed += triangles;
-      if (2 * passed >= all) break;
+    std::vector<std::pair<double, double>> errors; // and numbers of triangles
+    double all = 0.0;
+    for (const SimplifiedGroup& r : results) {
+      errors.emplace_back(r.error, static_cast<double>(r.source_triangles));
+      all += errors.back().second;
     }
+    const double median = weighted_quantile(errors, 0.5 * all);
     for (size_t i = 0; i < results.size(); ++i) {
       if (results[i].error <= kLossOverMedian * median || results[i].error <= kLossOverRadius * radius_of(members[i]))
         continue;
@@ -211,16 +212,14 @@ private:
 
   /// Half the diagonal of the box of a group's points.
   double radius_of(const std::vector<uint32_t>& members) const {
-    DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+    Bounds box;
     for (const uint32_t number : members) {
       const ClusterRange& range = lod_.clusters[number].range;
       for (uint32_t i = 0; i < range.triangle_count; ++i)
-        for (int corner = 0; corner < 3; ++corner) {
-          const DVec3 p = point(lod_.vertices[lod_.triangles[range.first_triangle + i][corner]].position);
-          lo = glm::min(lo, p), hi = glm::max(hi, p);
-        }
+        for (int corner = 0; corner < 3; ++corner)
+          box.extend(point(lod_.vertices[lod_.triangles[range.first_triangle + i][corner]].position));
     }
-    return 0.5 * glm::length(hi - lo);
+    return 0.5 * box.diagonal();
   }
 
   /// Drops the results of groups that kept too many triangles, so that they become terminal. Where the locks of other

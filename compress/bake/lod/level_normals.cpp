@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "compress/bake/clusters/renumbering.h"
+#include "pbrt_import/base/weighted_quantile.h"
 #include "pbrt_import/base/weld_table.h"
 #include "pbrt_import/scene/angle.h"
 
@@ -18,15 +19,10 @@ namespace {
 constexpr std::array<NormalEncoding, 3> kCoarser{NormalEncoding::kAxis12, NormalEncoding::kAxis16,
                                                  NormalEncoding::kOct20};
 constexpr double kShareOfTurn = 0.25;
-constexpr double kLooserShare = 0.25; // of the surface may turn by less
+constexpr double kLooserShare = 0.25; // share of the surface that may turn by less
 
-/// A triangle's error over its longest edge, and its area.
-struct Turn {
-  double ratio, area;
-};
-
-/// Returns nothing for triangles without area.
-std::optional<Turn> turn_of(const QuantizedGeometry& geometry, const Triangle& t, double error) {
+/// Returns a triangle's error over its longest edge, and twice its area; nothing for triangles without area.
+std::optional<std::pair<double, double>> turn_of(const QuantizedGeometry& geometry, const Triangle& t, double error) {
   std::array<DVec3, 3> sides{};
   double longest2 = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -38,7 +34,7 @@ std::optional<Turn> turn_of(const QuantizedGeometry& geometry, const Triangle& t
   }
   const double area = glm::length(glm::cross(sides[0], sides[1]));
   if (!(area > 0.0)) return std::nullopt;
-  return Turn{error / std::sqrt(longest2), area};
+  return std::pair(error / std::sqrt(longest2), area);
 }
 
 /// Encodes the normals of a level's vertices again.
@@ -93,22 +89,15 @@ private:
 
 double level_normal_limit(const QuantizedGeometry& geometry, const GeometryClusters& level,
                           std::span<const double> errors) {
-  std::vector<Turn> turns;
+  std::vector<std::pair<double, double>> turns;
   double all = 0.0;
   for (size_t i = 0; i < level.clusters.size(); ++i) {
     const ClusterRange& c = level.clusters[i];
     if (geometry.kinds[c.kind].flat) continue;
     for (const Triangle& t : std::span(level.triangles).subspan(c.first_triangle, c.triangle_count))
-      if (const auto turn = turn_of(geometry, t, errors[i])) turns.push_back(*turn), all += turn->area;
+      if (const auto turn = turn_of(geometry, t, errors[i])) turns.push_back(*turn), all += turn->second;
   }
-  std::sort(turns.begin(), turns.end(),
-            [](const Turn& a, const Turn& b) { return std::pair(a.ratio, a.area) < std::pair(b.ratio, b.area); });
-  double passed = 0.0;
-  for (const Turn& turn : turns) {
-    passed += turn.area;
-    if (passed >= kLooserShare * all) return kShareOfTurn * std::atan(4.0 * turn.ratio) * kDegreesPerRadian;
-  }
-  return 0.0;
+  return kShareOfTurn * std::atan(4.0 * weighted_quantile(turns, kLooserShare * all)) * kDegreesPerRadian;
 }
 
 CoarseNormals coarsen_normals(double limit_degrees, const QuantizedGeometry& geometry, GeometryClusters& level) {

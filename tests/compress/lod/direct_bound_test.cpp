@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <vector>
 
@@ -120,17 +121,21 @@ TEST(DirectBound, HistoryForgetsWhatIsTooFarBack) {
   EXPECT_EQ(std::vector<uint32_t>(second.begin(), second.end()), (std::vector<uint32_t>{7}));
 }
 
+/// Adds two triangles for each cell of a square grid.
+void add_cells(TriangleSet& set, uint32_t cells, const std::function<DVec3(uint32_t x, uint32_t y)>& point) {
+  for (uint32_t y = 0; y < cells; ++y)
+    for (uint32_t x = 0; x < cells; ++x) {
+      set.add({point(x, y), point(x + 1, y), point(x + 1, y + 1)}, 2 * (cells * y + x));
+      set.add({point(x, y), point(x + 1, y + 1), point(x, y + 1)}, 2 * (cells * y + x) + 1);
+    }
+}
+
 /// Where one triangle lies over many of a flat surface, the distance of its parts from single triangles is large.
 TEST(TriangleRefiner, FlatPartsHaveNoTangentialDistance) {
   constexpr uint32_t kCells = 4;
   const auto point = [](uint32_t x, uint32_t y) { return DVec3(x, y, 0.0); };
   TriangleRefiner refiner;
-  TriangleSet& among = refiner.begin();
-  for (uint32_t y = 0; y < kCells; ++y)
-    for (uint32_t x = 0; x < kCells; ++x) {
-      among.add({point(x, y), point(x + 1, y), point(x + 1, y + 1)}, 2 * (kCells * y + x));
-      among.add({point(x, y), point(x + 1, y + 1), point(x, y + 1)}, 2 * (kCells * y + x) + 1);
-    }
+  add_cells(refiner.begin(), kCells, point);
   refiner.measure_corners({DVec3(0.2, 0.1, 0.0), DVec3(3.9, 0.7, 0.0), DVec3(1.3, 3.6, 0.0)});
   double noted = 0.0;
   const double bound = refiner.run([&](double distance, uint32_t) { return distance <= 1e-9; },
@@ -145,12 +150,7 @@ TEST(TriangleRefiner, WhatSpansANotchIsAsFarAsItsMiddle) {
   constexpr double kDepth = 0.02;
   const auto point = [](uint32_t x, uint32_t y) { return DVec3(x, x == 4 && y == 0 ? kDepth : 1.0 * y, 0.0); };
   TriangleRefiner refiner;
-  TriangleSet& among = refiner.begin();
-  for (uint32_t y = 0; y < kCells; ++y)
-    for (uint32_t x = 0; x < kCells; ++x) {
-      among.add({point(x, y), point(x + 1, y), point(x + 1, y + 1)}, 2 * (kCells * y + x));
-      among.add({point(x, y), point(x + 1, y + 1), point(x, y + 1)}, 2 * (kCells * y + x) + 1);
-    }
+  add_cells(refiner.begin(), kCells, point);
   refiner.measure_corners({DVec3(0.0, 0.0, 0.0), DVec3(8.0, 0.0, 0.0), DVec3(4.1, 8.0, 0.0)});
   const double bound = refiner.run([](double, uint32_t) { return false; }, [](uint32_t, double) {});
   EXPECT_GE(bound, 0.999 * kDepth);
