@@ -130,7 +130,7 @@ private:
   std::vector<uint32_t> objects_by_name_; ///< index into Scene::objects, by number in object_names_
   std::vector<Place> object_places_;
   InstanceResiduals instance_residuals_; ///< for move_far_world()
-  glm::mat3 sound_linear_{1.0f};         ///< the last linear part of an instance that is_sound(), as the identity
+  glm::mat3 sound_linear_{1.0f};         ///< the last linear part of an instance for which is_sound() held
   uint32_t current_object_ = kNone;
   uint32_t nested_objects_ = 0;  ///< rejected nested ObjectBegins whose ObjectEnd is still to come
   uint64_t ignored_blocks_ = 0;  ///< open blocks beyond the nesting limit

@@ -6,7 +6,7 @@
 
 namespace packtrace {
 
-/// What tells how a linear map changes volumes and extents.
+/// How a linear map changes volumes and lengths.
 struct LinearExtent {
   explicit LinearExtent(const glm::dmat3& linear) {
     const DVec3 x = linear[0], y = linear[1], z = linear[2], yz = glm::cross(y, z), zx = glm::cross(z, x),
@@ -15,19 +15,21 @@ struct LinearExtent {
     cofactors = glm::dot(yz, yz) + glm::dot(zx, zx) + glm::dot(xy, xy);
     determinant = glm::dot(x, yz);
   }
-  /// True only if flattens() is false, as it is for most maps: the condition number is the product of the norms of the
-  /// map and of its cofactors, over the determinant. Needs neither a division nor a root. The margin covers rounding.
+  /// A fast sufficient test: if it is true, flattens() is false. The condition number is the norm of the map times the
+  /// norm of its cofactor matrix, divided by the determinant; squares need neither a division nor a root. The bound
+  /// leaves a margin for rounding.
   bool far_from_flat() const {
     constexpr double kSmall = 1e-60, kLarge = 1e60;
     return square > kSmall && square < kLarge && square * cofactors < 0x1p40 * determinant * determinant;
   }
 
   double square;    ///< squared Frobenius norm
-  double cofactors; ///< that of the cofactors
+  double cofactors; ///< squared Frobenius norm of the cofactor matrix
   double determinant;
 };
 
-/// True only if an affine map with this linear part and a finite translation has an inverse and does not flatten.
+/// A fast sufficient test: if it is true, an affine map with this linear part and a finite translation has an inverse
+/// and does not flatten.
 inline bool is_sound(const glm::dmat3& linear) {
   const LinearExtent extent(linear);
   return extent.far_from_flat() && std::abs(extent.determinant) > 1e-85;

@@ -7,8 +7,8 @@
 
 namespace packtrace {
 
-/// True only if clean_up_mesh() would neither change nor report anything and leave triangles. Told without allocations,
-/// for small meshes only, since most small ones are clean.
+/// A fast sufficient test for small meshes, most of which are clean: if it is true, clean_up_mesh() would leave the
+/// mesh as it is, report nothing, and the mesh has triangles. Allocates nothing.
 bool is_clean(const Mesh& mesh);
 
 /// Establishes the contract of Mesh. Drops triangles with an index out of range, a repeated index or a non-finite

@@ -13,7 +13,7 @@ namespace packtrace {
 /// Reads tokens in their common forms straight from the tokenizer's window: complete in it, and behind nothing but
 /// spaces, tabs and line ends with LF. It is a copy of the tokenizer's position, which only Tokenizer::accept() moves,
 /// so that a reader may give up at any token and leave the text to the tokenizer. Each take function skips white space
-/// and reads one token; if the token has another form, the result says so, and the position has no meaning any more.
+/// and reads one token; if the token has another form, the result says so, and the position becomes invalid.
 class PlainText {
 public:
   /// Nothing to read.
@@ -83,7 +83,7 @@ public:
     mark_token();
     return take_number(scan, value);
   }
-  /// True only if a word follows that is no number, nan or inf.
+  /// Whether a word follows that is not a number, nan or inf. May be false for such words, too.
   bool other_word_follows() {
     const char c = static_cast<char>(peek() | 0x20);
     if (c < 'a' || c > 'z' || at_ + 2 >= end_) return false;
@@ -100,7 +100,7 @@ public:
     at_ = window_ + (offset - window_offset_);
     line_ = line, line_start_ = line_start;
   }
-  /// Position of the last token; numbers that are not words do not count.
+  /// Position of the last token; numbers that take_number() read do not count.
   uint32_t token_line() const { return token_line_; }
   uint32_t token_column() const {
     return static_cast<uint32_t>(std::min<uint64_t>(token_offset_ - token_line_start_ + 1, UINT32_MAX));

@@ -20,9 +20,8 @@ public:
   /// Returns the ratio of stated to measured error of each group that made clusters of this level and whose measured
   /// error is not only rounding. Call for the levels in order. Measured are
   /// - the distance of its clusters from the level 0 clusters that it may represent
-  /// - the distance of points of these from its clusters, where no other group can represent the point. A group can
-  /// only
-  ///   represent what a group below it can, and what is as near as it states.
+  /// - the distance of points of these from its clusters, where no other group can represent the point. A
+  ///   group can only represent what a group below it can, and what is as near as it states.
   std::vector<double> ratios(uint32_t level);
   /// Largest amount by which a group's measured error exceeds its stated error, or by which a point of level 0 is
   /// further from each group that may represent it than that group states; lattice steps.

@@ -53,7 +53,7 @@ struct LodLimits {
   uint32_t max_levels = baked::kMaxLodLevels; ///< 1..baked::kMaxLodLevels, including level 0
   /// Per position of the geometry: 1 if no level may move it (SharedBorders). Empty if all may move.
   std::vector<uint8_t> locked;
-  bool coarser_normals = true; ///< encode_lod()
+  bool coarser_normals = true; ///< passed to encode_lod()
 };
 
 /// Builds coarser levels until 16 triangles are left, nothing can be simplified further or max_levels is reached.

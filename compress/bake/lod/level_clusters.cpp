@@ -10,7 +10,7 @@
 namespace packtrace {
 namespace {
 
-constexpr double kTypicalNormalBits = 15.0; // of a typical vertex of a level
+constexpr double kTypicalNormalBits = 15.0; // of a vertex in a typical level
 constexpr double kRecordBits = 8.0 * (sizeof(baked::ClusterRecord) + sizeof(baked::LodLinkRecord));
 
 std::vector<TreeBox> boxes_of(std::span<const Triangle> points, std::span<const DVec3> positions) {

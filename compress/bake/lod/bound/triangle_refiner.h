@@ -71,7 +71,7 @@ private:
   static constexpr size_t kSubtractedCuts = 2; // parts that were cut more often are not subtracted from
   // Subtracts only where the bound is this many times the lower bound: mostly tangential distance.
   static constexpr double kLeak = 8.0;
-  // Bounds above this many times a lower bound are measured once more, when that is known.
+  // If the first run's bound exceeds this many times the lower bound that it found, there is a second run.
   static constexpr double kLoose = 2.0;
   static constexpr size_t kMaxLookedAt = 512;  // triangles of a set that is subtracted from
   static constexpr size_t kMaxSubtracted = 48; // triangles near enough to be subtracted
