@@ -4,75 +4,19 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
-#include <limits>
 #include <utility>
 
 #include <tbb/parallel_invoke.h>
 
+#include "compress/format/trees/bin_kernels.h"
+
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kMaxBins = 64;
 constexpr uint32_t kParallelCount = 2048; // smaller subtrees are built serially
-
-TreeBox empty_box() {
-  constexpr float kInf = std::numeric_limits<float>::infinity();
-  return {{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
-}
-
-using Float4 = float __attribute__((vector_size(16)));
-using Double4 = double __attribute__((vector_size(32)));
-using Int4 = int32_t __attribute__((vector_size(16)));
-
-/// A TreeBox in two overlapping vectors of its six floats, which extend without a loop over the axes.
-struct BoxLanes {
-  Float4 front; ///< low ends, then the first high end, which is not used
-  Float4 back;  ///< the last low end, which is not used, then high ends
-
-  BoxLanes() = default; // undefined, because most bins of short runs are never used
-  explicit BoxLanes(const TreeBox& box) {
-    static_assert(sizeof(TreeBox) == 24);
-    const auto* const floats = reinterpret_cast<const char*>(&box);
-    std::memcpy(&front, floats, sizeof front);
-    std::memcpy(&back, floats + sizeof box - sizeof back, sizeof back);
-  }
-  void extend(const BoxLanes& other) {
-    front = other.front < front ? other.front : front;
-    back = other.back > back ? other.back : back;
-  }
-  TreeBox box() const {
-    float floats[8];
-    std::memcpy(floats, &front, sizeof front);
-    std::memcpy(floats + 4, &back, sizeof back);
-    return {{floats[0], floats[1], floats[2]}, {floats[5], floats[6], floats[7]}};
-  }
-  /// The centre along each axis, rounded to floats; the fourth lane is not used.
-  Float4 centre() const {
-    const Float4 high = __builtin_shufflevector(back, back, 1, 2, 3, 3);
-    return __builtin_convertvector(
-        (__builtin_convertvector(front, Double4) + __builtin_convertvector(high, Double4)) * 0.5, Float4);
-  }
-};
 
 /// Twice the centre of a box along an axis.
 double centre(const TreeBox& box, size_t axis) { return double{box.lo[axis]} + box.hi[axis]; }
-
-struct Split {
-  double cost = std::numeric_limits<double>::infinity();
-  size_t axis = 0;
-  uint32_t bin = 0; ///< the first bin on the right
-};
-
-/// Maps centres along one axis to bins.
-struct BinAxis {
-  double low = 0.0, scale = 0.0; ///< scale is 0 if all centres are equal
-  uint32_t bins = 0;
-
-  uint32_t operator()(double place) const {
-    const auto bin = static_cast<uint32_t>((place - low) * scale); // not negative
-    return std::min(bin, bins - 1);
-  }
-};
 
 /// Splits runs of boxes in two.
 class Splitter {
@@ -81,21 +25,13 @@ public:
   explicit Splitter(std::span<const TreeBox> boxes, uint32_t unit = 1) : boxes_(boxes), unit_(unit) {}
 
   /// Returns the bounds of the boxes' centres. `whole` receives the bounds of the boxes.
-  TreeBox measure(std::span<const uint32_t> order, TreeBox& whole) const {
-    BoxLanes all(empty_box());
-    constexpr float kInf = std::numeric_limits<float>::infinity();
-    Float4 lowest{kInf, kInf, kInf, kInf}, highest = -lowest;
-    for (const uint32_t i : order) {
-      const BoxLanes box(boxes_[i]);
-      all.extend(box);
-      const Float4 place = box.centre();
-      lowest = place < lowest ? place : lowest;
-      highest = place > highest ? place : highest;
-    }
-    whole = all.box();
+  TreeBox measure(std::span<uint32_t> order, TreeBox& whole) const {
+    bin_kernels::RunBounds bounds;
+    kernels_.measure(run(order), bounds);
     TreeBox centres;
-    std::memcpy(centres.lo.data(), &lowest, sizeof centres.lo);
-    std::memcpy(centres.hi.data(), &highest, sizeof centres.hi);
+    static_assert(sizeof whole == sizeof bounds.boxes && sizeof centres == sizeof bounds.centres);
+    std::memcpy(&whole, bounds.boxes, sizeof whole);
+    std::memcpy(&centres, bounds.centres, sizeof centres);
     return centres;
   }
 
@@ -106,77 +42,23 @@ public:
     // one, only halving is sure to keep the depth limit.
     const bool must_halve = static_cast<uint32_t>(std::bit_width(count - 1)) + 1 >= levels;
     if (!must_halve) {
-      std::array<BinAxis, 3> axes;
+      bin_kernels::Bins bins;
+      bins.count = std::min(bin_kernels::kMaxBins, 2 * count);
       for (size_t axis = 0; axis < 3; ++axis) {
-        axes[axis].bins = std::min(kMaxBins, 2 * count);
-        axes[axis].low = 2.0 * centres.lo[axis];
+        bins.low[axis] = 2.0 * centres.lo[axis];
         const double extent = 2.0 * (double{centres.hi[axis]} - centres.lo[axis]);
-        axes[axis].scale = extent > 0.0 ? axes[axis].bins / extent : 0.0;
+        bins.scale[axis] = extent > 0.0 ? bins.count / extent : 0.0;
       }
-      const Split best = find_split(order, axes);
-      if (best.bin > 0) {
-        const auto middle = std::partition(order.begin(), order.end(), [&](uint32_t i) {
-          return axes[best.axis](rounded_centre(boxes_[i], best.axis)) < best.bin;
-        });
-        return static_cast<uint32_t>(middle - order.begin());
-      }
+      if (const uint32_t left = kernels_.split(run(order), bins, unit_); left > 0) return left;
     }
     halve(order, centres);
     return count / 2;
   }
 
 private:
-  static double rounded_centre(const TreeBox& box, size_t axis) {
-    return 2.0 * double{static_cast<float>(0.5 * centre(box, axis))};
-  }
-
-  /// Boxes of one axis by their bins.
-  struct Bins {
-    std::array<BoxLanes, kMaxBins> boxes;
-    std::array<uint32_t, kMaxBins> counts;
-  };
-
-  Split find_split(std::span<const uint32_t> order, const std::array<BinAxis, 3>& axes) const {
-    std::array<Bins, 3> bins;
-    const BoxLanes empty(empty_box());
-    for (size_t axis = 0; axis < 3; ++axis) {
-      std::fill_n(bins[axis].boxes.begin(), axes[axis].bins, empty);
-      std::fill_n(bins[axis].counts.begin(), axes[axis].bins, 0u);
-    }
-    const Double4 low{axes[0].low, axes[1].low, axes[2].low}, scale{axes[0].scale, axes[1].scale, axes[2].scale};
-    for (const uint32_t i : order) {
-      const BoxLanes box(boxes_[i]);
-      const Double4 place = __builtin_convertvector(box.centre(), Double4) * 2.0;
-      const Int4 number = __builtin_convertvector((place - low) * scale, Int4); // as BinAxis computes it
-      std::array<int32_t, 4> numbers;
-      std::memcpy(numbers.data(), &number, sizeof number);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const uint32_t b = std::min(static_cast<uint32_t>(numbers[axis]), axes[axis].bins - 1);
-        bins[axis].boxes[b].extend(box);
-        ++bins[axis].counts[b];
-      }
-    }
-    Split best;
-    for (size_t axis = 0; axis < 3; ++axis)
-      if (axes[axis].scale > 0.0) sweep(bins[axis], axes[axis].bins, axis, best);
-    return best;
-  }
-
-  /// Replaces `best` by the cheapest split between bins of an axis if that is cheaper.
-  void sweep(const Bins& bins, uint32_t count, size_t axis, Split& best) const {
-    std::array<double, kMaxBins> right_cost; // of bins b and above, for b > 0
-    BoxLanes box(empty_box());
-    for (uint32_t b = count, n = 0; b-- > 1;) {
-      if (bins.counts[b] > 0) box.extend(bins.boxes[b]), n += bins.counts[b];
-      right_cost[b] = n > 0 ? box.box().half_area() * units(n) : -1.0;
-    }
-    box = BoxLanes(empty_box());
-    for (uint32_t b = 1, n = 0; b < count; ++b) {
-      if (bins.counts[b - 1] > 0) box.extend(bins.boxes[b - 1]), n += bins.counts[b - 1];
-      if (n == 0 || right_cost[b] < 0.0) continue;
-      const double cost = box.box().half_area() * units(n) + right_cost[b];
-      if (cost < best.cost) best = {cost, axis, b};
-    }
+  bin_kernels::Run run(std::span<uint32_t> order) const {
+    static_assert(sizeof(TreeBox) == 6 * sizeof(float));
+    return {boxes_[0].lo.data(), order.data(), static_cast<uint32_t>(order.size())};
   }
 
   /// Moves the half with the lower centres along the longest axis to the left.
@@ -189,9 +71,8 @@ private:
                      [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
   }
 
-  double units(uint32_t count) const { return unit_ == 1 ? count : (count + unit_ - 1) / unit_; }
-
   std::span<const TreeBox> boxes_;
+  const bin_kernels::Kernels& kernels_ = bin_kernels::kernels();
   const uint32_t unit_;
 };
 
@@ -262,7 +143,7 @@ private:
 } // namespace
 
 BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth) {
-  assert(boxes.size() <= uint64_t{1} << 31 && max_depth >= 33);
+  assert(boxes.size() < uint64_t{1} << 31 && max_depth >= 33);
   BoxTree tree;
   if (boxes.empty()) return tree;
   tree.nodes.resize(2 * boxes.size() - 1);
@@ -272,7 +153,7 @@ BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth) {
 }
 
 std::vector<uint32_t> cut_boxes(std::span<const TreeBox> boxes, uint32_t max_count, std::vector<uint32_t>& order) {
-  assert(boxes.size() <= uint64_t{1} << 31 && max_count > 0);
+  assert(boxes.size() < uint64_t{1} << 31 && max_count > 0);
   order = counted(boxes.size());
   std::vector<uint32_t> ends;
   if (!boxes.empty())

@@ -43,7 +43,7 @@ inline constexpr uint32_t kDefaultTreeDepth = 40;
 /// found or where the tree would become deeper than max_depth. Takes O(n log n) time, except for boxes of exponentially
 /// growing size, which take O(n max_depth). Runs on all threads; the result depends only on the boxes.
 /// Source: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
-/// @param boxes at most 2^31
+/// @param boxes fewer than 2^31
 /// @param max_depth levels of nodes; at least 33, so that any number of boxes fits
 BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth = kDefaultTreeDepth);
 

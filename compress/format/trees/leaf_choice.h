@@ -3,12 +3,12 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/trees/leaf_nodes.h"
+#include "compress/format/trees/sweep_kernels.h"
 
 namespace packtrace {
 
@@ -21,12 +21,23 @@ inline Float4 max_of(Float4 a, Float4 b) { return a > b ? a : b; }
 struct FloatBox {
   Float4 minus_lo, hi; ///< the fourth lanes are 0
 
+  static FloatBox of(const sweep_kernels::Box& box) {
+    FloatBox out;
+    static_assert(sizeof out == sizeof box);
+    std::memcpy(&out, &box, sizeof out);
+    return out;
+  }
   static FloatBox of(const TreeGridBox& box) {
     float lanes[8]{};
     for (size_t axis = 0; axis < 3; ++axis)
       lanes[axis] = -static_cast<float>(box.lo[axis]), lanes[4 + axis] = static_cast<float>(box.hi[axis]);
     FloatBox out;
     std::memcpy(&out, lanes, sizeof out);
+    return out;
+  }
+  sweep_kernels::Box stored() const {
+    sweep_kernels::Box out;
+    std::memcpy(&out, this, sizeof out);
     return out;
   }
   void extend(const FloatBox& other) {
@@ -47,43 +58,6 @@ inline float first_lane(const Float4& lanes) {
   float first;
   std::memcpy(&first, &lanes, sizeof first);
   return first;
-}
-
-/// Best split of a run of `count` triangles: the split with the least cost; of equal costs the one nearest to the
-/// middle.
-struct RunSplit {
-  float cost = std::numeric_limits<float>::infinity();
-  uint32_t left = 1;
-
-  void improve(float other, uint32_t at, uint32_t count) {
-    const auto off_middle = [count](uint32_t split) {
-      return split > count - split ? 2 * split - count : count - 2 * split;
-    };
-    if (other < cost || (other == cost && off_middle(at) < off_middle(left))) cost = other, left = at;
-  }
-};
-
-/// Lowers `best` by the splits of a run of boxes.
-/// @param count 2..128
-/// @param box_at returns the box at a place of the run
-/// @return half the surface area of all boxes together
-template <typename BoxAt>
-float sweep_run(uint32_t count, const BoxAt& box_at, RunSplit& best) {
-  std::array<Float4, kMaxClusterTriangles> right_area;
-  FloatBox box = box_at(count - 1);
-  for (uint32_t i = count - 1; i > 0; --i) {
-    right_area[i] = half_area(box);
-    box.extend(box_at(i - 1));
-  }
-  const float area = first_lane(half_area(box));
-  box = box_at(0);
-  for (uint32_t i = 1; i < count; ++i) {
-    const Float4 left_cost = half_area(box) * static_cast<float>(i);
-    if (first_lane(left_cost) > best.cost) break; // the cost of the left side only grows
-    best.improve(first_lane(left_cost + right_area[i] * static_cast<float>(count - i)), i, count);
-    box.extend(box_at(i));
-  }
-  return area;
 }
 
 /// A node of a binary tree over runs of a cluster's triangles, stored in preorder: the left child is the next node.

@@ -7,11 +7,13 @@
 namespace packtrace {
 namespace {
 
+static_assert(kMaxClusterTriangles <= sweep_kernels::kMaxBoxes);
+
 /// Binary tree over runs of triangles in stream order, split by the surface area heuristic.
 class RunTree {
 public:
   explicit RunTree(std::span<const TreeGridBox> boxes) {
-    for (size_t i = 0; i < boxes.size(); ++i) boxes_[i] = FloatBox::of(boxes[i]);
+    for (size_t i = 0; i < boxes.size(); ++i) boxes_[i] = FloatBox::of(boxes[i]).stored();
     build(0, static_cast<uint32_t>(boxes.size()));
   }
   std::span<RunNode> nodes() { return std::span(nodes_).first(size_); }
@@ -21,21 +23,23 @@ private:
     const uint32_t number = size_++;
     RunNode& node = nodes_[number];
     node.first = static_cast<uint8_t>(first), node.count = static_cast<uint8_t>(count), node.right = 0;
-    RunSplit best; // two boxes have one split
+    uint32_t left = 1; // two boxes have one split
     if (count <= 2) {
-      FloatBox box = boxes_[first];
-      box.extend(boxes_[first + count - 1]);
+      FloatBox box = FloatBox::of(boxes_[first]);
+      box.extend(FloatBox::of(boxes_[first + count - 1]));
       node.area = first_lane(half_area(box));
       if (count == 1) return;
     } else {
-      node.area = sweep_run(count, [&](uint32_t i) { return boxes_[first + i]; }, best);
+      const sweep_kernels::Split best = kernels_.split_run(boxes_.data() + first, count);
+      node.area = best.area, left = best.left;
     }
-    build(first, best.left);
+    build(first, left);
     node.right = static_cast<uint8_t>(size_);
-    build(first + best.left, count - best.left);
+    build(first + left, count - left);
   }
 
-  std::array<FloatBox, kMaxClusterTriangles> boxes_;
+  const sweep_kernels::Kernels& kernels_ = sweep_kernels::kernels();
+  std::array<sweep_kernels::Box, kMaxClusterTriangles> boxes_;
   std::array<RunNode, 2 * kMaxClusterTriangles> nodes_;
   uint32_t size_ = 0;
 };

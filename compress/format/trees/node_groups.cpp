@@ -54,9 +54,9 @@ public:
     const auto count = static_cast<uint32_t>(triangles.size());
     std::array<std::array<int32_t, 4>, kMaxClusterTriangles> centres; // twice the centres
     for (uint32_t i = 0; i < count; ++i) {
-      boxes_[i] = points.of(triangles[i]);
-      const Int4 centre =
-          __builtin_convertvector(boxes_[i].hi, Int4) - __builtin_convertvector(boxes_[i].minus_lo, Int4);
+      const FloatBox box = points.of(triangles[i]);
+      boxes_[i] = box.stored();
+      const Int4 centre = __builtin_convertvector(box.hi, Int4) - __builtin_convertvector(box.minus_lo, Int4);
       std::memcpy(centres[i].data(), &centre, sizeof centre);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -89,8 +89,8 @@ private:
     RunNode& node = nodes_[number];
     node.first = static_cast<uint8_t>(first), node.count = static_cast<uint8_t>(count), node.right = 0;
     if (count <= kUndivided) {
-      FloatBox box = boxes_[order_[0][first]];
-      for (uint32_t i = 1; i < count; ++i) box.extend(boxes_[order_[0][first + i]]);
+      FloatBox box = FloatBox::of(boxes_[order_[0][first]]);
+      for (uint32_t i = 1; i < count; ++i) box.extend(FloatBox::of(boxes_[order_[0][first + i]]));
       node.area = first_lane(half_area(box));
       return;
     }
@@ -102,17 +102,13 @@ private:
 
   /// Finds the best split and partitions the boxes in all three orders. Returns the number of boxes on the left.
   uint32_t split(uint32_t first, uint32_t count, float& area) {
-    RunSplit best;
-    size_t best_axis = 0;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const RunSplit before = best;
-      const uint8_t* const order = order_[axis].data() + first;
-      area = sweep_run(count, [&](uint32_t i) { return boxes_[order[i]]; }, best);
-      if (best.cost != before.cost || best.left != before.left) best_axis = axis;
-    }
-    for (uint32_t i = 0; i < count; ++i) on_left_[order_[best_axis][first + i]] = i < best.left;
+    std::array<const uint8_t*, 3> orders;
+    for (size_t axis = 0; axis < 3; ++axis) orders[axis] = order_[axis].data() + first;
+    const sweep_kernels::Split best = kernels_.split_orders(boxes_.data(), orders.data(), count);
+    area = best.area;
+    for (uint32_t i = 0; i < count; ++i) on_left_[order_[best.axis][first + i]] = i < best.left;
     for (size_t axis = 0; axis < 3; ++axis)
-      if (axis != best_axis) partition(order_[axis].data() + first, count);
+      if (axis != best.axis) partition(order_[axis].data() + first, count);
     return best.left;
   }
 
@@ -127,7 +123,8 @@ private:
     std::copy_n(right.begin(), on_right, order + on_left);
   }
 
-  std::array<FloatBox, kMaxClusterTriangles> boxes_;
+  const sweep_kernels::Kernels& kernels_ = sweep_kernels::kernels();
+  std::array<sweep_kernels::Box, kMaxClusterTriangles> boxes_;
   /// Per axis: box numbers; each node's run is sorted by centres along the axis.
   std::array<std::array<uint8_t, kMaxClusterTriangles>, 3> order_;
   std::array<uint8_t, kMaxClusterTriangles> on_left_; ///< per box
