@@ -33,6 +33,10 @@ struct alignas(64) Beam {
   /// inverse: least and greatest reciprocal of the direction. limits: as RayGroup::limits.
   float origin[3][2], inverse[3][2], limits[2];
   bool stale; ///< whether limits are outdated
+  /// Whether unit-space t is t times unit_scale, and both are floats of usual size. Then hits are recorded a register
+  /// at a time.
+  bool plain;
+  float unit_scale[kGroup], grid_scale[kGroup]; ///< t in unit space per t in the grid and the inverse, powers of two
 
   /// Recomputes limits[1]; needed after RayGroup::set_tmax().
   void update_limits(const RayGroup& group) {
@@ -48,6 +52,22 @@ struct alignas(64) Beam {
 };
 
 constexpr uint32_t kMinBeamRays = 16; ///< minimum number of rays for which a beam is worth its setup
+
+/// Sets the scales of a beam.
+inline void set_scales(const RayGroup& group, Beam& beam) {
+  constexpr double kLeast = 0x1p-60, kMost = 0x1p60;
+  uint32_t plain = (1u << kDoubleLanes) - 1;
+  for (uint32_t at = 0; at < kGroup; at += kDoubleLanes) {
+    Doubles begin, scale;
+    read_block(begin, &group.t_begin[at]);
+    read_block(scale, &group.t_scale[at]);
+    plain &= lanes_between(kLeast, begin == 0.0 ? scale : Doubles{}, kMost);
+    write_block(&beam.unit_scale[at], to_floats(scale));
+    write_block(&beam.grid_scale[at],
+                to_floats(reinterpret_cast<Doubles>((int64_t{2046} << 52) - reinterpret_cast<Longs>(scale))));
+  }
+  beam.plain = plain == (1u << kDoubleLanes) - 1;
+}
 
 /// Makes a beam of all rays of a group. Returns false if they have no common origin or octant, or are too few.
 /// @param pad_coordinate as in enter()
@@ -74,6 +94,7 @@ inline bool make_beam(RayGroup& group, float pad_coordinate, uint64_t rays, Beam
     }
     group.begin[i] = __builtin_inff();
     group.end[i] = -__builtin_inff();
+    group.t_begin[i] = group.t_begin[first], group.t_scale[i] = group.t_scale[first];
   }
   float reach = pad_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));
@@ -98,6 +119,7 @@ inline bool make_beam(RayGroup& group, float pad_coordinate, uint64_t rays, Beam
   }
   beam.limits[0] = -largest_lane(-least);
   beam.update_limits(group);
+  set_scales(group, beam);
   return true;
 }
 

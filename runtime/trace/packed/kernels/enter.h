@@ -205,13 +205,14 @@ inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, fl
 }
 
 /// Transforms rays into a tree's grid and prepares them for box and triangle tests. Returns the rays that may hit
-/// something, as a bit mask.
+/// something, as a bit mask. If nearest hits of rays of one origin are wanted, the caller calls make_beam() or
+/// fill_records() next.
 /// @tparam kNearest as for move_block()
 /// @param pad_coordinate coordinate that the pad of box planes is computed from; a ray's own origin counts instead if
 /// its largest coordinate is larger
 /// @param rays bit mask of the rays to transform
 /// @param group a RayGroup, or BoxRays or SideBySideRays if the grid is unit space
-template <bool kNearest, typename Group>
+template <bool kNearest, bool kForBeam = false, typename Group>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, float pad_coordinate, const UnitRays& from,
                       uint64_t rays, Group& group) {
   uint64_t entered = 0;
@@ -232,10 +233,10 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, flo
                    ? move_block<true, kNearest>(placement, max_coordinate, from, first, wanted, block, group)
                    : move_block<false, kNearest>(placement, max_coordinate, from, first, wanted, block, group);
     entered |= uint64_t{usable} << first;
-    set_boxes(block, pad_coordinate, first, group);
+    set_boxes<kForBeam>(block, pad_coordinate, first, group);
     if constexpr (Group::kSideBySide)
       if (find_reach) reach.template add<kNearest>(block, usable);
-    if constexpr (Group::kTriangles) set_shears<kNearest>(block, first, group);
+    if constexpr (Group::kTriangles) set_shears<kNearest, kForBeam>(block, first, group);
   }
   if constexpr (Group::kSideBySide) {
     if (find_reach)

@@ -38,7 +38,7 @@ template <typename Lanes>
 struct GroupBoxes {
   typename Lanes::F near[3], far[3];
 
-  GroupBoxes(const baked::PackedNode& node, uint32_t octant) {
+  [[gnu::always_inline]] GroupBoxes(const baked::PackedNode& node, uint32_t octant) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const NodeAxis at(node, axis, ((octant >> axis) & 1u) != 0);
       const auto origin = Lanes::set(at.origin), unit = Lanes::set(at.unit);
@@ -56,7 +56,7 @@ struct GroupBoxes {
     }
   }
 
-  GroupBoxes(const TopNode& node, uint32_t octant) {
+  [[gnu::always_inline]] GroupBoxes(const TopNode& node, uint32_t octant) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const bool backward = ((octant >> axis) & 1u) != 0;
       near[axis] = Lanes::load(backward ? node.hi[axis] : node.lo[axis]);

@@ -72,6 +72,15 @@ struct Avx2Lanes {
                                            _mm256_set1_epi32(static_cast<int32_t>(x)));
     return bits(_mm256_castsi256_ps(all));
   }
+  /// Writes the lanes of a bit mask; other elements of p[0] to p[7] stay.
+  static void store(float* p, uint32_t lanes, F a) {
+    const __m256i bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    const __m256i chosen = _mm256_and_si256(_mm256_set1_epi32(static_cast<int32_t>(lanes)), bits);
+    _mm256_maskstore_ps(p, _mm256_cmpeq_epi32(chosen, bits), a);
+  }
+  static void store(uint32_t* p, uint32_t lanes, uint32_t x) {
+    store(reinterpret_cast<float*>(p), lanes, _mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int32_t>(x))));
+  }
   static uint32_t less(F a, F b) { return bits(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
   static uint32_t less_equal(F a, F b) { return bits(_mm256_cmp_ps(a, b, _CMP_LE_OQ)); }
 

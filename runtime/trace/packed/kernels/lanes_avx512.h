@@ -59,6 +59,11 @@ struct Avx512Lanes {
   static uint32_t equal(const uint32_t* p, uint32_t x) {
     return _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(p), _mm512_set1_epi32(static_cast<int32_t>(x)));
   }
+  /// Writes the lanes of a bit mask; other elements of p[0] to p[15] stay.
+  static void store(float* p, uint32_t lanes, F a) { _mm512_mask_storeu_ps(p, static_cast<__mmask16>(lanes), a); }
+  static void store(uint32_t* p, uint32_t lanes, uint32_t x) {
+    _mm512_mask_storeu_epi32(p, static_cast<__mmask16>(lanes), _mm512_set1_epi32(static_cast<int32_t>(x)));
+  }
   static uint32_t less(F a, F b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
   static uint32_t less_equal(F a, F b) { return _mm512_cmp_ps_mask(a, b, _CMP_LE_OQ); }
 };

@@ -103,6 +103,13 @@ struct ScalarLanes {
   static uint32_t equal(const uint32_t* p, uint32_t x) {
     return bits([&](uint32_t i) { return p[i] == x; });
   }
+  /// Writes the lanes of a bit mask; other elements of p[0] to p[7] stay.
+  static void store(float* p, uint32_t lanes, F a) {
+    for (; lanes != 0; lanes &= lanes - 1) p[__builtin_ctz(lanes)] = a.lane[__builtin_ctz(lanes)];
+  }
+  static void store(uint32_t* p, uint32_t lanes, uint32_t x) {
+    for (; lanes != 0; lanes &= lanes - 1) p[__builtin_ctz(lanes)] = x;
+  }
   static uint32_t less(F a, F b) {
     return bits([&](uint32_t i) { return a.lane[i] < b.lane[i]; });
   }

@@ -42,6 +42,11 @@ struct alignas(64) UnitRays {
 
 struct Beam;
 
+/// Returns 1 / x for a power of two in [2^-500, 2^500].
+inline double inverse_of_power(double x) {
+  return __builtin_bit_cast(double, (int64_t{2046} << 52) - __builtin_bit_cast(int64_t, x));
+}
+
 /// Bounding box of all points at which a group's rays may hit something, to compare a node's boxes with: see
 /// group_bounds.h.
 struct GroupBounds {
@@ -93,7 +98,7 @@ struct alignas(64) BoxRays {
   float unit_t(uint32_t i, float t) const { return static_cast<float>((double{t} + t_begin[i]) * t_scale[i]); }
   /// Returns a grid t that is not below any grid t that maps to `unit_t`. Where the origin was moved, several do.
   float t_of(uint32_t i, float unit_t) const {
-    const double t = double{unit_t} / t_scale[i];
+    const double t = double{unit_t} * inverse_of_power(t_scale[i]);
     return static_cast<float>(t - t_begin[i] + (t_begin[i] != 0.0 ? kUnitRounding * t : 0.0));
   }
   void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
@@ -165,6 +170,27 @@ inline bool start_at_one_place(const UnitRays& rays, uint32_t count) {
   return lane_bits(same) == kBlockLanes;
 }
 
+/// Whether all rays of a full group have directions of one octant and a range of t that is not empty.
+inline bool have_one_octant(const UnitRays& rays) {
+  Ints ranges = Ints{} - 1;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    Ints forward = Ints{} - 1, backward = forward;
+    for (uint32_t first = 0; first < kGroup; first += kBlock) {
+      Ints direction;
+      read_block(direction, &rays.direction[axis][first]);
+      forward &= direction >= 0, backward &= direction < 0;
+    }
+    if (lane_bits(forward) != kBlockLanes && lane_bits(backward) != kBlockLanes) return false;
+  }
+  for (uint32_t first = 0; first < kGroup; first += kBlock) {
+    Floats begin, end;
+    read_block(begin, &rays.tnear[first]);
+    read_block(end, &rays.tmax[first]);
+    ranges &= (begin >= 0.0f) & (end >= begin);
+  }
+  return lane_bits(ranges) == kBlockLanes;
+}
+
 /// A block of rays in a tree's grid, the input of set_boxes() and set_shears().
 struct RayBlock {
   Floats origin[3], direction[3], begin, end;
@@ -173,12 +199,13 @@ struct RayBlock {
 
 /// Writes the data for box tests of a block, starting at element `first` of the group.
 /// @param pad_coordinate minimum of kBoxPad's M
-template <typename Group>
+/// @tparam kForBeam whether `limits` and `bias` are left to fill_records()
+template <bool kForBeam, typename Group>
 [[gnu::always_inline]] inline void set_boxes(const RayBlock& block, float pad_coordinate, uint32_t first,
                                              Group& group) {
   Floats reach = Floats{} + pad_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) keep_larger(reach, magnitude(block.origin[axis]));
-  write_pairs(&group.limits[first], block.begin, -block.end);
+  if constexpr (!kForBeam) write_pairs(&group.limits[first], block.begin, -block.end);
   if constexpr (Group::kSideBySide) {
     write_block(&group.begin[first], block.begin);
     write_block(&group.end[first], block.end);
@@ -190,7 +217,7 @@ template <typename Group>
     const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
     const Floats back = block.origin[axis] * inverse, away = kBoxPad * reach * over;
     write_block(&group.inverse[axis][first], inverse);
-    write_pairs(&group.bias[axis][first], -back - away, back - away);
+    if constexpr (!kForBeam) write_pairs(&group.bias[axis][first], -back - away, back - away);
     if constexpr (Group::kSideBySide) {
       write_block(&group.near_bias[axis][first], -back - away);
       write_block(&group.far_bias[axis][first], away - back);
@@ -201,7 +228,8 @@ template <typename Group>
 
 /// Writes the data for triangle tests of a block, starting at element `first` of the group.
 /// @tparam kNearest whether block.rest is set
-template <bool kNearest>
+/// @tparam kForBeam whether `tests` and `rests` are left to fill_records()
+template <bool kNearest, bool kForBeam>
 inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.origin[axis][first], block.origin[axis]);
   const Floats x = block.direction[0], y = block.direction[1], z = block.direction[2];
@@ -224,14 +252,49 @@ inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   const Floats along = rows[2];
   rows[4] = rows[0] / along, rows[5] = rows[1] / along, rows[6] = 1.0f / along;
   for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.shear[axis][first], rows[4 + axis]);
+  if constexpr (kNearest)
+    for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.rest[axis][first], block.rest[axis]);
+  if constexpr (kForBeam) return;
   along_k(block.origin, rows);
   rows[3] = block.begin, rows[7] = block.end;
   transpose(rows);
   write_rows(rows, &group.tests[first]);
   if constexpr (kNearest) {
     Floats rests[8]{};
-    for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.rest[axis][first], block.rest[axis]);
     along_k(block.rest, rests);
+    transpose(rests);
+    write_rows(rests, &group.rests[first]);
+  }
+}
+
+/// Writes what set_boxes() and set_shears() leave out for a beam.
+inline void fill_records(RayGroup& group) {
+  for (uint32_t first = 0; first < kGroup; first += kBlock) {
+    RayBlock block;
+    Ints k0;
+    read_block(block.begin, &group.begin[first]);
+    read_block(block.end, &group.end[first]);
+    read_block(k0, &group.axis[0][first]);
+    write_pairs(&group.limits[first], block.begin, -block.end);
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      Floats near, far;
+      read_block(near, &group.near_bias[axis][first]);
+      read_block(far, &group.far_bias[axis][first]);
+      write_pairs(&group.bias[axis][first], near, -far);
+      read_block(block.origin[axis], &group.origin[axis][first]);
+      read_block(block.rest[axis], &group.rest[axis][first]);
+    }
+    Floats rows[8], rests[8]{};
+    for (uint32_t k = 0; k < 3; ++k) {
+      const auto along_k = [&](const Floats(&v)[3]) {
+        return k0 == 0 ? v[k] : k0 == 1 ? v[(k + 1) % 3] : v[(k + 2) % 3];
+      };
+      rows[k] = along_k(block.origin), rests[k] = along_k(block.rest);
+      read_block(rows[4 + k], &group.shear[k][first]);
+    }
+    rows[3] = block.begin, rows[7] = block.end;
+    transpose(rows);
+    write_rows(rows, &group.tests[first]);
     transpose(rests);
     write_rows(rests, &group.rests[first]);
   }

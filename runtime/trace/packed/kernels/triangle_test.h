@@ -223,32 +223,27 @@ inline uint32_t starts_near_plane(Relative relative, Normal normal, typename Lan
 
 /// Returns the lanes in which a ray hits a triangle, as a bit mask. Avoids unpredictable branches until a lane hits.
 /// @tparam kWeights whether hits are filled in; otherwise only the lanes are computed
-/// @tparam kUseResidual whether t counts from the origin before it was rounded to floats
-/// @param vertex function of (k, corner) that returns the corner's coordinate along Woop's axis k
-/// @param origin function of k that returns the origin's coordinate along Woop's axis k
+/// @param relative function of (k, corner) that returns the corner's coordinate along Woop's axis k, less the origin's
+/// @param height function that returns depth_along()
+/// @param residual function of this height that takes residual_along() from it
 /// @param normal function of k that returns the plane normal's component along Woop's axis k
-/// @param rest function of k that returns the origin's rounding error (exact minus rounded) along Woop's axis k
+/// @param exact function of (lanes, x, y, z, depth, along) that calls test_exactly() and returns its result
 /// @tparam Fine FineGrid<true> if the tree's grid is so fine that sheared corners need doubles near edges, else
 /// FineGrid<false>
 /// @param wanted bit mask of the lanes to test
 /// @param exact_count incremented by the number of lanes that were evaluated in doubles
-template <typename Lanes, bool kWeights, bool kUseResidual, typename Vertex, typename Origin, typename Normal,
-          typename Rest, typename Fine>
-inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest rest, const RayLanes<Lanes>& rays, Fine,
-                           uint32_t wanted, LaneHits<Lanes>& hits, uint64_t& exact_count) {
+template <typename Lanes, bool kWeights, typename Relative, typename Depth, typename Residual, typename Normal,
+          typename Exact, typename Fine>
+[[gnu::always_inline]] inline uint32_t test_relative(Relative relative, Depth height, Residual residual, Normal normal,
+                                                     Exact exact, const RayLanes<Lanes>& rays, Fine, uint32_t wanted,
+                                                     LaneHits<Lanes>& hits, uint64_t& exact_count) {
   using F = typename Lanes::F;
   const F sx = rays.shear[0], sy = rays.shear[1];
-  const auto relative = [&](uint32_t k, uint32_t corner) { return Lanes::sub(vertex(k, corner), origin(k)); };
-  // t comes from the plane rather than from the weights. On a plane perpendicular to an axis, only the coordinates
-  // along that axis then contribute, which ray offsets rely on. For nearest hits the origin's rounding error is taken
-  // into account: along a grazing ray it is magnified many times.
-  F x[3], y[3], z[3], depth = Lanes::set(0.0f);
+  F x[3], y[3], z[3];
   for (uint32_t corner = 0; corner < 3; ++corner) {
-    const F p = relative(0, corner), q = relative(1, corner);
     z[corner] = relative(2, corner);
-    if (corner == 0) depth = Lanes::fma(p, normal(0), Lanes::fma(q, normal(1), Lanes::mul(z[0], normal(2))));
-    x[corner] = Lanes::fnma(sx, z[corner], p);
-    y[corner] = Lanes::fnma(sy, z[corner], q);
+    x[corner] = Lanes::fnma(sx, z[corner], relative(0, corner));
+    y[corner] = Lanes::fnma(sy, z[corner], relative(1, corner));
   }
   const F u2 = Lanes::mul(y[2], x[1]), v2 = Lanes::mul(y[0], x[2]), w2 = Lanes::mul(y[1], x[0]);
   const F u = Lanes::fms(x[2], y[1], u2), v = Lanes::fms(x[0], y[2], v2), w = Lanes::fms(x[1], y[0], w2);
@@ -262,9 +257,7 @@ inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest res
   uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
   if constexpr (kWeights)
     if ((inside | unsure) == 0) return 0;
-  if constexpr (kUseResidual)
-    depth = Lanes::sub(depth,
-                       Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2)))));
+  const F depth = residual(height());
   const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2))), zero = Lanes::set(0.0f);
   // Rounding the sheared corners may give area to a sliver that has no plane or whose plane contains the ray's
   // direction.
@@ -281,19 +274,57 @@ inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest res
   }
   if (unsure != 0) {
     exact_count += static_cast<uint64_t>(__builtin_popcount(unsure));
-    uint32_t found;
-    if constexpr (Fine::value) {
-      float stored[20][Lanes::kLanes];
-      const auto corners = shear_exactly<Lanes, kUseResidual>(vertex, origin, normal, rest, rays, stored);
-      found = test_exactly<Lanes>(unsure, corners, rays.shear[2], along, hits);
-    } else {
-      float stored[10][Lanes::kLanes];
-      found = test_exactly<Lanes>(unsure, stored_corners<Lanes>(x, y, z, depth, stored), rays.shear[2], along, hits);
-    }
+    const uint32_t found = exact(unsure, x, y, z, depth, along);
     t = Lanes::load(hits.t);
     hit |= found & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
   }
   return hit;
+}
+
+/// Returns the height of a triangle's corner 0 above the ray's origin along the plane's normal, without the origin's
+/// rounding error. t comes from the plane rather than from the weights. On a plane perpendicular to an axis, only the
+/// coordinates along that axis then contribute, which ray offsets rely on.
+template <typename Lanes, typename Relative, typename Normal>
+inline typename Lanes::F depth_along(Relative relative, Normal normal) {
+  return Lanes::fma(relative(0, 0), normal(0),
+                    Lanes::fma(relative(1, 0), normal(1), Lanes::mul(relative(2, 0), normal(2))));
+}
+
+/// Returns what the origin's rounding error takes from depth_along(). For nearest hits it is taken into account: along
+/// a grazing ray it is magnified many times.
+template <typename Lanes, typename Rest, typename Normal>
+inline typename Lanes::F residual_along(Rest rest, Normal normal) {
+  return Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2))));
+}
+
+/// Does the same as test_relative().
+/// @tparam kUseResidual whether t counts from the origin before it was rounded to floats
+/// @param vertex function of (k, corner) that returns the corner's coordinate along Woop's axis k
+/// @param origin function of k that returns the origin's coordinate along Woop's axis k
+/// @param rest function of k that returns the origin's rounding error (exact minus rounded) along Woop's axis k
+template <typename Lanes, bool kWeights, bool kUseResidual, typename Vertex, typename Origin, typename Normal,
+          typename Rest, typename Fine>
+inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest rest, const RayLanes<Lanes>& rays,
+                           Fine fine, uint32_t wanted, LaneHits<Lanes>& hits, uint64_t& exact_count) {
+  using F = typename Lanes::F;
+  const auto relative = [&](uint32_t k, uint32_t corner) { return Lanes::sub(vertex(k, corner), origin(k)); };
+  const auto residual = [&](F depth) {
+    if constexpr (!kUseResidual) return depth;
+    return Lanes::sub(depth, residual_along<Lanes>(rest, normal));
+  };
+  const auto exact = [&](uint32_t lanes, const F(&x)[3], const F(&y)[3], const F(&z)[3], F depth, F along) {
+    if constexpr (Fine::value) {
+      float stored[20][Lanes::kLanes];
+      const auto corners = shear_exactly<Lanes, kUseResidual>(vertex, origin, normal, rest, rays, stored);
+      return test_exactly<Lanes>(lanes, corners, rays.shear[2], along, hits);
+    } else {
+      float stored[10][Lanes::kLanes];
+      return test_exactly<Lanes>(lanes, stored_corners<Lanes>(x, y, z, depth, stored), rays.shear[2], along, hits);
+    }
+  };
+  return test_relative<Lanes, kWeights>(
+      relative, [&] { return depth_along<Lanes>(relative, normal); }, residual, normal, exact, rays, fine, wanted, hits,
+      exact_count);
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 #include "runtime/trace/packed/kernels/batch_strips.h"
 #include "runtime/trace/packed/kernels/beam.h"
 #include "runtime/trace/packed/kernels/group_bounds.h"
+#include "runtime/trace/packed/kernels/leaf_tests.h"
 #include "runtime/trace/packed/kernels/node_children.h"
 #include "runtime/trace/packed/kernels/side_by_side.h"
 
@@ -29,7 +30,6 @@ struct ChildTests {
       if (group.beam != nullptr) {
         slots &= pass_beam(boxes, *group.beam, t);
         if (slots == 0) return 0;
-        if (count_ones(rays) < kMinSideBySideRays) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
         return pass_side_by_side(boxes, group, rays, slots, by_child);
       }
     if (kAny && count_ones(rays) < kMinSideBySideRays)

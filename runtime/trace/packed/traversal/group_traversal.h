@@ -1,13 +1,13 @@
 #pragma once
 
-#include "runtime/trace/packed/kernels/batch_decode.h"
 #include "runtime/trace/packed/kernels/beam.h"
 #include "runtime/trace/packed/kernels/enter.h"
 #include "runtime/trace/packed/kernels/group_bounds.h"
-#include "runtime/trace/packed/kernels/leaf_tests.h"
 #include "runtime/trace/packed/kernels/node_children.h"
+#include "runtime/trace/packed/kernels/unit_beam.h"
 #include "runtime/trace/packed/traversal/child_tests.h"
 #include "runtime/trace/packed/traversal/external_tree_search.h"
+#include "runtime/trace/packed/traversal/leaf_tracer.h"
 
 /// Traces groups of rays through the tree over placements and through placed trees. A group visits a node together, as
 /// a 64-bit mask of rays, and the node test yields a mask per child of the rays that hit its box. A node is read and
@@ -22,20 +22,26 @@ constexpr uint32_t kPrefetchedLines = 7;
 
 /// Finds any hits (kAny) or nearest hits of one ray class in one scene, on one thread, group by group.
 template <typename Lanes, bool kAny, bool kCount>
-class GroupTraversal {
+class GroupTraversal : LeafTracer<Lanes, kAny, kCount> {
+  using Leaves = LeafTracer<Lanes, kAny, kCount>;
+  using Leaves::fine_grid_, Leaves::trace_leaf;
+  using Leaves::numbers_, Leaves::hits_, Leaves::run_hits_, Leaves::is_run_, Leaves::exact_differences_;
+  using Leaves::scene_, Leaves::counters_, Leaves::ray_class_, Leaves::alive_, Leaves::nearer_, Leaves::unit_;
+
 public:
   using Kernel = Lanes;
   static constexpr bool kAnyHit = kAny;
 
-  /// @param hits for nearest hits: one per ray, with placement ~0 where there is no hit yet
+  /// @param hits for nearest hits: one per ray, with placement ~0 where there is no hit yet. Records of rays that are
+  /// traced by trace_run() are only written.
   GroupTraversal(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, uint32_t ray_class,
                  KernelHit* hits, KernelCounters* counters)
-      : scene_(scene), cache_(cache), rays_(rays), ray_class_(ray_class), hits_(hits), counters_(counters) {}
+      : Leaves(scene, cache, ray_class, hits, counters), rays_(rays) {}
 
   /// Makes the given rays the current group.
   /// @param numbers indices of 1 to kGroup rays; must stay valid while the group is traced
   void take(const uint32_t* numbers, uint32_t count) {
-    numbers_ = numbers;
+    numbers_ = numbers, is_run_ = has_beam_ = false;
     alive_ = ~uint64_t{0} >> (kGroup - count);
     for (uint32_t first = 0; first < count; first += kBlock) {
       uint32_t block[kBlock];
@@ -43,6 +49,31 @@ public:
       read_rays(rays_, block, first, unit_);
     }
     if constexpr (!kAny) unit_.one_origin = start_at_one_place(unit_, count);
+  }
+
+  /// Makes kGroup rays that follow each other the current group and traces them. Returns false, and traces nothing, if
+  /// they are no camera rays of one octant.
+  /// @param first index of the first ray
+  bool trace_run(uint32_t first) {
+    const KernelRay& a = rays_[first];
+    for (const uint32_t other : {7u, kGroup - 8, kGroup - 1}) { // the corners of a block of 8 x 8 pixels
+      const KernelRay& b = rays_[first + other];
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        if (b.origin[axis] != a.origin[axis] ||
+            __builtin_signbit(b.direction[axis]) != __builtin_signbit(a.direction[axis]))
+          return false;
+    }
+    for (uint32_t i = 0; i < kGroup; ++i) run_[i] = first + i;
+    for (uint32_t i = 0; i < kGroup; i += 2)
+      __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<uintptr_t>(&a) + (kGroup + i) * sizeof a));
+    take(run_, kGroup);
+    if (!unit_.one_origin || !have_one_octant(unit_)) return false;
+    is_run_ = true;
+    run_hits_.clear();
+    has_beam_ = make_unit_beam(unit_, scene_.top_max_coordinate, beam_);
+    trace();
+    run_hits_.write(unit_.tmax, hits_ + first);
+    return true;
   }
 
   /// Does the same, and keeps the hits found so far: each ray ends at its nearest hit.
@@ -54,11 +85,14 @@ public:
   }
 
   /// Traces the current group through the whole scene.
-  void trace() {
-    if (scene_.top_nodes != nullptr)
+  [[gnu::noinline]] void trace() {
+    if (scene_.top_nodes == nullptr) {
+      if (scene_.placement_count > 0) trace_placement(0, alive_);
+    } else if (!kAny && has_beam_) {
+      trace_top_beam();
+    } else {
       trace_top();
-    else if (scene_.placement_count > 0)
-      trace_placement(0, alive_);
+    }
   }
 
   /// Traces the current group through one placement.
@@ -76,10 +110,6 @@ public:
 private:
   friend struct ExternalTreeSearch<GroupTraversal>;
   using Tests = ChildTests<Lanes, kAny>;
-
-  struct Place {
-    uint32_t placement, cluster, triangle;
-  };
 
   /// Partitions rays by the octant of their direction and calls visit(rays, octant) for each part.
   template <typename Visit>
@@ -131,6 +161,52 @@ private:
     }
   }
 
+  /// Traces a beam through the tree over placements. Rays are not tested one by one before they are transformed: most
+  /// beams meet few placements.
+  void trace_top_beam() {
+    Pending stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
+    uint32_t size = 0;
+    stack[size++] = {0, 0, 0.0f};
+    float last = find_last();
+    while (size > 0) {
+      const Pending next = stack[--size];
+      if (next.t > last) continue;
+      if ((next.node & kTopLeaf) != 0) {
+        const uint32_t placement = next.node & ~kTopLeaf;
+        float t[baked::kNodeWidth];
+        if (scene_.parts != nullptr &&
+            (pass_beam(typename Lanes::Boxes(scene_.parts[placement], beam_.octant), beam_.beam, t) &
+             scene_.parts[placement].slots) == 0)
+          continue;
+        nearer_ = 0;
+        trace_placement(placement, alive_);
+        if (nearer_ != 0) last = find_last();
+        continue;
+      }
+      const TopNode& node = scene_.top_nodes[next.node];
+      float t[baked::kNodeWidth];
+      uint32_t slots = node.slots & pass_beam(typename Lanes::Boxes(node, beam_.octant), beam_.beam, t);
+      for (const uint32_t begin = size; slots != 0; slots &= slots - 1) {
+        const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
+        uint32_t at = size++;
+        for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
+        stack[at] = {0, node.child[slot], t[slot]};
+      }
+    }
+  }
+
+  /// Returns the largest tmax of a full group.
+  float find_last() const {
+    float last = unit_.tmax[0];
+    for (uint32_t first = 0; first < kGroup; first += kBlock) {
+      Floats some;
+      read_block(some, &unit_.tmax[first]);
+      const float largest = largest_lane(some);
+      last = last < largest ? largest : last;
+    }
+    return last;
+  }
+
   /// Returns the rays that hit the box of a part of the placement, or all rays if the scene has no parts.
   uint64_t reach_parts(uint32_t placement, const SideBySideRays& group, uint64_t rays, uint32_t octant) const {
     if (scene_.parts == nullptr) return rays;
@@ -145,18 +221,27 @@ private:
   void trace_placement(uint32_t placement, uint64_t rays) {
     const TracePlacement& place = scene_.placements[placement];
     if (rays == 0 || (place.ray_classes & ray_class_) == 0) return;
-    if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
+    if constexpr (!kAny)
+      if (has_beam_ && scene_.search_tree == nullptr && !may_enter<typename Lanes::Boxes>(place, tree, unit_, beam_))
+        return;
+    if constexpr (kCount) counters_->placements += count_ones(rays);
     exact_differences_ = tree.max_coordinate <= kExactDifferences;
     fine_grid_ = tree.max_coordinate > kFineGrid;
     RayGroup group;
     graded_ = tree.graded != 0;
     const float pad_coordinate = (graded_ ? kMinTopPad : 1.0f) * tree.max_coordinate;
-    rays = enter<!kAny>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
-    if (graded_) group.reach = kUnboundedGroup;
     Beam beam;
-    if constexpr (!kAny)
-      if (unit_.one_origin && make_beam(group, pad_coordinate, rays, beam)) group.beam = &beam;
+    if (!kAny && unit_.one_origin && scene_.search_tree == nullptr) {
+      rays = enter<true, true>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
+      if (make_beam(group, pad_coordinate, rays, beam))
+        group.beam = &beam;
+      else
+        fill_records(group);
+    } else {
+      rays = enter<!kAny>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
+    }
+    if (graded_) group.reach = kUnboundedGroup;
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
       group.reach.set_octant(octant);
       if (scene_.search_tree != nullptr)
@@ -230,160 +315,11 @@ private:
       if (group.beam != nullptr && group.beam->stale) group.beam->update_limits(group);
   }
 
-  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
-                  uint64_t rays) {
-    if (fine_grid_) [[unlikely]]
-      trace_fine_leaf(placement, cluster, first, count, group, rays);
-    else
-      trace_leaf(placement, cluster, first, count, group, rays, FineGrid<false>());
-  }
-
-  [[gnu::noinline]] void trace_fine_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count,
-                                         RayGroup& group, uint64_t rays) {
-    trace_leaf(placement, cluster, first, count, group, rays, FineGrid<true>());
-  }
-
-  template <typename Fine>
-  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group, uint64_t rays,
-                  Fine fine) {
-    if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
-    while (count > 0) {
-      const DecodedBatch& batch = decoded(cluster, first, count);
-      if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
-      const Place place{placement, cluster, first};
-      BatchNormals normals;
-      if (exact_differences_)
-        normals = batch_normals<Lanes>(batch);
-      else
-        batch_normals_of_large(batch, normals);
-      uint64_t exact = 0;
-      if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
-        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, fine, exact);
-      } else {
-        const uint64_t others = test_side_by_side(batch, normals, place, group, rays, fine);
-        const bool many = Lanes::WideLanes::kLanes > kBatch && count_ones(others) >= kMinPrefilteredRays;
-        test_each(batch, normals, place, group,
-                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, fine, exact) : others, fine);
-      }
-      if constexpr (kCount) counters_->exact_triangles += exact;
-      rays &= alive_;
-      first += batch.count;
-      count -= batch.count;
-    }
-  }
-
-  /// Tests one ray after the other, each against all triangles of the batch.
-  template <typename Fine>
-  void test_each(const DecodedBatch& batch, const BatchNormals& normals, const Place& place, RayGroup& group,
-                 uint64_t rays, Fine fine) {
-    for (uint64_t m = rays; m != 0; m &= m - 1) {
-      const uint32_t i = first_bit(m);
-      LaneHits<Lanes> hits;
-      uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes, !kAny>(batch, normals, group, i, fine, hits, exact);
-      if constexpr (kCount) counters_->exact_triangles += exact;
-      if (lanes != 0) take_hits(place, i, hits, lanes, group);
-    }
-  }
-
-  /// Tests one triangle after the other against registers of rays, where a register has at least as many active rays as
-  /// the batch has triangles. Returns the remaining rays, as a bit mask.
-  template <typename Fine>
-  uint64_t test_side_by_side(const DecodedBatch& batch, const BatchNormals& normals, Place place, RayGroup& group,
-                             uint64_t rays, Fine fine) {
-    using WideLanes = typename Lanes::WideLanes;
-    const uint32_t begin = place.triangle;
-    for (uint32_t at = 0; at < kGroup; at += WideLanes::kLanes) {
-      const uint32_t wanted = lanes_at<WideLanes>(rays, at);
-      uint32_t axis[3];
-      if (count_ones(wanted) < batch.count || !same_axes<WideLanes>(group, at, wanted, axis)) continue;
-      rays &= ~(uint64_t{wanted} << at);
-      for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
-        LaneHits<WideLanes> hits;
-        uint64_t exact = 0;
-        uint32_t lanes =
-            test_rays<WideLanes, !kAny>(batch, normals, triangle, group, axis, at, fine, wanted, hits, exact);
-        if constexpr (kCount) counters_->exact_triangles += exact;
-        place.triangle = begin + triangle;
-        for (; lanes != 0; lanes &= lanes - 1) {
-          const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
-          take_hit(place, at + lane, hits.t[lane], hits.u[lane], hits.v[lane], group);
-        }
-      }
-    }
-    return rays;
-  }
-
-  const DecodedBatch& decoded(uint32_t cluster, uint32_t first, uint32_t count) {
-    const uint64_t tag = (uint64_t{cluster} << 8 | first) + 1;
-    const auto hash = static_cast<uint32_t>(tag) * 0x9e3779b1u;
-    DecodedBatch& batch = cache_.entries[hash >> cache_.hash_shift];
-    if (batch.tag != tag) {
-      if constexpr (kCount) ++counters_->batches_decoded;
-      const TraceCluster& packed = scene_.clusters[cluster];
-      batch.tag = tag;
-      batch.count = (packed.flags & kNeedsWideDecode) == 0
-                        ? Lanes::decode(packed, first, count, batch)
-                        : scene_.decode_wide(scene_.owner, cluster, first, count, batch);
-    }
-    return batch;
-  }
-
-  /// Records the hits of ray i in the given lanes (triangles) of a batch that begins at `place`.
-  void take_hits(Place place, uint32_t i, const LaneHits<Lanes>& hits, uint32_t lanes, RayGroup& group) {
-    const uint32_t begin = place.triangle;
-    for (; lanes != 0; lanes &= lanes - 1) {
-      const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
-      place.triangle = begin + lane;
-      if (take_hit(place, i, hits.t[lane], hits.u[lane], hits.v[lane], group) && kAny) return;
-    }
-  }
-
-  /// Records a hit of ray i and returns true if it counts: it is not masked out and, for nearest hits, is the nearest
-  /// so far. Hits are compared by their t in unit space, so the result does not depend on the order of placements.
-  bool take_hit(const Place& place, uint32_t i, float t, float u, float v, RayGroup& group) {
-    float unit_t = 0.0f;
-    if constexpr (!kAny) {
-      unit_t = group.unit_t(i, t);
-      if (unit_t > unit_.tmax[i] || (unit_t == unit_.tmax[i] && !precedes(place, hits_[numbers_[i]]))) return false;
-    }
-    if ((scene_.clusters[place.cluster].flags & kMasked) != 0 &&
-        !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, u, v, ray_class_))
-      return false;
-    if constexpr (kAny) {
-      alive_ &= ~(uint64_t{1} << i);
-    } else {
-      nearer_ |= uint64_t{1} << i;
-      group.set_tmax(i, group.t_of(i, unit_t));
-      if (group.beam != nullptr) group.beam->stale = true;
-      unit_.tmax[i] = unit_t;
-      hits_[numbers_[i]] = {unit_t, u, v, place.placement, place.cluster, place.triangle};
-    }
-    return true;
-  }
-
-  /// Of two hits with equal t, the one with the smaller numbers counts.
-  static bool precedes(const Place& place, const KernelHit& hit) {
-    // Every placement number is less than ~0, which means no hit.
-    if (hit.placement != place.placement) return place.placement < hit.placement;
-    if (hit.cluster != place.cluster) return place.cluster < hit.cluster;
-    return place.triangle < hit.triangle;
-  }
-
-  const KernelScene& scene_;
-  BatchCache& cache_;
   const KernelRay* const rays_;
-  const uint32_t ray_class_;
-  KernelHit* const hits_;
-  KernelCounters* const counters_;
-  // State of the current group:
-  const uint32_t* numbers_ = nullptr; ///< indices of its rays
-  uint64_t alive_ = 0;                ///< rays that still look for a hit
-  uint64_t nearer_ = 0;               ///< rays whose nearest hit lies in the placement traced last
-  bool graded_ = false;               ///< TraceTree::graded of the current tree
-  bool exact_differences_ = false;    ///< whether vertex differences are exact in floats in the current tree
-  bool fine_grid_ = false;            ///< whether coordinates of the current tree exceed kFineGrid
-  UnitRays unit_;
+  uint32_t run_[kGroup]; ///< numbers of the rays of trace_run()
+  UnitBeam beam_;        ///< of the current run, if has_beam_
+  bool has_beam_ = false;
+  bool graded_ = false; ///< TraceTree::graded of the current tree
 };
 
 } // namespace

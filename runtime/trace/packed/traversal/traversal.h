@@ -32,6 +32,26 @@ public:
 private:
   void sort(size_t begin, size_t end) {
     uint32_t numbers[8][kGroup], sizes[8] = {};
+    if (kAny || streams_) {
+      sort(begin, end, numbers, sizes);
+    } else {
+      for (size_t first = begin; first < end; first += kGroup)
+        if (end - first < kGroup || !trace_run(first))
+          sort(first, first + kGroup < end ? first + kGroup : end, numbers, sizes);
+    }
+    for (uint32_t octant = 0; octant < 8; ++octant)
+      if (sizes[octant] > 0) trace(numbers[octant], sizes[octant], octant);
+  }
+
+  /// Traces kGroup rays if they are camera rays of one octant; otherwise returns false.
+  bool trace_run(size_t first) {
+    if constexpr (kAny) return false;
+    if (!groups_.trace_run(static_cast<uint32_t>(first))) return false;
+    if constexpr (kCount) counters_->rays += kGroup;
+    return true;
+  }
+
+  [[gnu::always_inline]] void sort(size_t begin, size_t end, uint32_t (&numbers)[8][kGroup], uint32_t (&sizes)[8]) {
     for (size_t i = begin; i < end; ++i) {
       const auto number = static_cast<uint32_t>(i);
       __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<uintptr_t>(rays_ + i) + kBytesAhead));
@@ -48,8 +68,6 @@ private:
         sizes[octant] = 0;
       }
     }
-    for (uint32_t octant = 0; octant < 8; ++octant)
-      if (sizes[octant] > 0) trace(numbers[octant], sizes[octant], octant);
   }
 
   static uint32_t octant_of(const float (&v)[3]) {
