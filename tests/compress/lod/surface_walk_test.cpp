@@ -59,6 +59,19 @@ protected:
     return least;
   }
 
+  /// Corners and crossings of a triangle's image.
+  std::vector<DVec3> outline_of(uint32_t t) {
+    const Triangle& p = s_.triangles[t].points;
+    std::vector<DVec3> outline;
+    for (int i = 0; i < 3; ++i) {
+      const SurfaceWalk::EdgePath& way =
+          walk_.way(s_.mesh.side_edges[3 * size_t{t} + static_cast<size_t>(i)], p[i], p[(i + 1) % 3]);
+      for (uint32_t k = way.first; k < way.first + way.count; ++k) outline.push_back(walk_.crossing(k).point());
+      outline.push_back(walk_.place(p[i]).at);
+    }
+    return outline;
+  }
+
   const Simplified s_{GetParam()};
   SurfaceSide after_{{s_.mesh.points, s_.mesh.triangles}};
   SurfaceWalk walk_{{s_.points, s_.triangles}, after_, s_.mesh};
@@ -71,12 +84,15 @@ TEST_P(TriangleImagesOf, BoundsTheDistanceOfEveryTriangle) {
     TriangleImages::Image image{};
     if (!images_.find(t, image)) continue;
     ++mapped;
-    std::vector<OverlayPiece> pieces;
+    std::vector<TriangleImages::Piece> pieces;
     images_.look_closer(t, image, pieces);
     ASSERT_FALSE(pieces.empty());
-    double closer = 0.0;
-    for (const OverlayPiece& piece : pieces) closer = std::max(closer, piece.distance);
+    double closer = 0.0, back = 0.0;
+    for (const TriangleImages::Piece& piece : pieces)
+      closer = std::max(closer, piece.there), back = std::max(back, piece.back);
     EXPECT_LE(closer, image.distance);
+    EXPECT_LE(back, image.distance);
+    for (const DVec3& at : outline_of(t)) EXPECT_LE(walk_.source().distance(at, t), back + 1e-9) << "triangle " << t;
     EXPECT_LE(image.inside, image.distance);
     const Triangle& p = s_.triangles[t].points;
     for (int i = 0; i <= 8; ++i)
@@ -115,6 +131,37 @@ TEST_P(TriangleImagesOf, CoverTrianglesAfterOnceAwayFromBorders) {
   EXPECT_GT(whole, shares.size() / 4);
   EXPECT_GT(other, 0u);
   EXPECT_LT(whole, shares.size());
+}
+
+TEST(SurfaceWalk, PlacesPointsOfSteepSurfacesAndConnectsThem) {
+  const Simplified s(0.25, 12.0, true);
+  SurfaceSide after{{s.mesh.points, s.mesh.triangles}};
+  after.link();
+  SurfaceWalk walk({s.points, s.triangles}, after, s.mesh);
+  size_t paths = 0, found = 0;
+  for (uint32_t p = 0; p < s.points.size(); ++p) EXPECT_NE(walk.place(p).state, SurfaceWalk::Place::State::kNowhere);
+  for (uint32_t t = 0; t < s.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const Triangle& p = s.triangles[t].points;
+      const uint32_t a = std::min(p[i], p[(i + 1) % 3]), b = std::max(p[i], p[(i + 1) % 3]);
+      const SurfaceWalk::EdgePath& way = walk.way(s.mesh.side_edges[3 * size_t{t} + static_cast<size_t>(i)], a, b);
+      ++paths, found += way.state != SurfaceWalk::EdgePath::State::kNowhere;
+      if (way.state != SurfaceWalk::EdgePath::State::kAcross) continue;
+      double last = 0.0;
+      for (uint32_t k = way.first; k < way.first + way.count; ++k) {
+        const SurfaceWalk::Crossing& c = walk.crossing(k);
+        const uint32_t from = k == way.first ? way.start : walk.into(k - 1);
+        for (const uint32_t side : {from, c.into}) EXPECT_LE(after.surface().distance(c.point(), side), 1e-9);
+        EXPECT_GE(c.on, last);
+        EXPECT_LE(c.on, 1.0);
+        last = c.on;
+        EXPECT_NEAR(c.distance2,
+                    glm::dot(c.point() - s.points[a] - c.on * (s.points[b] - s.points[a]),
+                             c.point() - s.points[a] - c.on * (s.points[b] - s.points[a])),
+                    1e-6);
+      }
+    }
+  EXPECT_GT(found, paths * 9 / 10) << found << " of " << paths;
 }
 
 INSTANTIATE_TEST_SUITE_P(Kept, TriangleImagesOf, testing::Values(0.9, 0.5, 0.25));

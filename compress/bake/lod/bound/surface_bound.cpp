@@ -145,7 +145,6 @@ private:
       entry.settled = true;
       const uint32_t t = entry.triangle;
       if (look_closer_at_image(entry)) continue;
-      mapped_[t] = 0;
       simplified_.gather(source_.corner_points(t));
       best_.clear();
       // Even with an image, the triangle may not be covered by the candidates.
@@ -212,17 +211,24 @@ private:
     }
   }
 
-  /// On steep parts an image may lie far from its preimage. Measures to the nearest points instead.
+  /// On steep parts an image may lie far from its preimage. Measures to the nearest points instead, one way at a time:
+  /// the image covers simplified triangles if it is near enough to the source triangle. Returns whether the source
+  /// triangle is near enough to simplified triangles.
   bool look_closer_at_image(const MappedTriangle& entry) {
     const uint32_t t = entry.triangle;
     if (mapped_[t] == 0) return false;
-    best_.clear();
-    images_.look_closer(t, entry.image, best_);
-    double largest = 0.0;
-    for (const OverlayPiece& piece : best_) largest = std::max(largest, piece.distance);
-    if (!error_.enough(largest, inherited_error(t))) return false;
-    accept(t);
-    return true;
+    image_pieces_.clear();
+    images_.look_closer(t, entry.image, image_pieces_);
+    double there = 0.0, back = 0.0;
+    for (const TriangleImages::Piece& piece : image_pieces_)
+      there = std::max(there, piece.there), back = std::max(back, piece.back);
+    const bool is_near = error_.enough(there, inherited_error(t));
+    mapped_[t] = error_.enough(back, inherited_error(t));
+    for (const TriangleImages::Piece& piece : image_pieces_) {
+      if (mapped_[t] != 0) note_simplified(piece.simplified, t, piece.back);
+      if (is_near) note(piece.simplified, t, piece.there);
+    }
+    return is_near;
   }
 
   /// On steep parts the distance along the normal is too large. Measures to the nearest points instead. Returns the
@@ -315,6 +321,7 @@ private:
   std::vector<double> edge_inherited_error_, point_inherited_error_;
   std::vector<uint32_t> without_overlay_;
   std::vector<OverlayPiece> best_, refined_; ///< of the current triangle
+  std::vector<TriangleImages::Piece> image_pieces_;
   TriangleRefiner refiner_;
   GroupError error_;
 };

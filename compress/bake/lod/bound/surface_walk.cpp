@@ -10,6 +10,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kMaxPathTriangles = 32; // maximum number of triangles on a path
+constexpr uint32_t kMaxTurns = 12;         // maximum number of triangles on a path around one point
 // minimum sine (edge to normal) of a slice; minimum cosine (normals) of an image's triangle
 constexpr double kSteep = 0.05;
 
@@ -110,8 +111,26 @@ inline void SurfaceWalk::enter(const Slice& slice, uint32_t corner, Exit& exit) 
     exit.corner = next_corner(corner), exit.left = &next, exit.side_left = side;
 }
 
-/// Walks from the simplified point that `source` became to where `source` projects onto the surface along the normal.
+/// Projects a point onto the surface along the normal or, where that fails at folds and borders, takes the nearest
+/// position around the simplified point that it became.
 void SurfaceWalk::find_place(uint32_t source, Place& out) const {
+  project(source, out);
+  if (out.state == Place::State::kNowhere) place_nearest(source, out);
+}
+
+void SurfaceWalk::place_nearest(uint32_t source, Place& out) const {
+  const DVec3& from = source_.points[source];
+  for (const uint32_t t : simplified_.around(mesh_.stands_for[source])) {
+    const uint32_t* p = &corner_points_[4 * size_t{t}];
+    const DVec3 at = nearest_point(from, point(p[0]), point(p[1]), point(p[2])), d = from - at;
+    const double distance2 = glm::dot(d, d);
+    if (out.state == Place::State::kTriangle && distance2 >= out.distance2) continue;
+    out.at = at, out.distance2 = distance2, out.number = t, out.state = Place::State::kTriangle;
+  }
+}
+
+/// Walks from the simplified point that `source` became to where `source` projects onto the surface along the normal.
+void SurfaceWalk::project(uint32_t source, Place& out) const {
   const uint32_t became = mesh_.stands_for[source];
   const DVec3 &from = point(became), &to = source_.points[source];
   out.state = Place::State::kPoint, out.number = became, out.at = from;
@@ -162,18 +181,85 @@ void SurfaceWalk::find_path(uint32_t edge, uint32_t a, uint32_t b, EdgePath& out
       return;
     }
   }
+  make_room();
+  if (find_straight(a, b, from, goal, out) || find_around(a, b, from, goal, out)) out.state = EdgePath::State::kAcross;
+  out.count = static_cast<uint32_t>(crossing_count_) - out.first;
+  for (uint32_t i = 0; i < out.count; ++i) out.distance2 = std::max(out.distance2, crossings_[out.first + i].distance2);
+}
+
+/// Finds the path in the plane of the edge and the surface normals.
+bool SurfaceWalk::find_straight(uint32_t a, uint32_t b, const Place& from, const Place& goal, EdgePath& out) {
   Slice slice;
   const DVec3 up = facing_[mesh_.stands_for[a]] + facing_[mesh_.stands_for[b]];
-  if (!make_slice(source_.points[a], source_.points[b], up, slice)) return;
+  if (!make_slice(source_.points[a], source_.points[b], up, slice)) return false;
   Exit exit;
   if (!(from.state == Place::State::kPoint ? leave_point(slice, from.number, exit)
                                            : leave_triangle(slice, from.number, exit)))
-    return;
+    return false;
   out.start = exit.corner / 4;
-  make_room();
-  if (cross(slice, exit, goal)) out.state = EdgePath::State::kAcross;
-  out.count = static_cast<uint32_t>(crossing_count_) - out.first;
-  for (uint32_t i = 0; i < out.count; ++i) out.distance2 = std::max(out.distance2, crossings_[out.first + i].distance2);
+  return cross(slice, exit, goal);
+}
+
+/// Counts the triangles from `triangle` around a point, in one direction, to the first that `wanted` accepts; kNone if
+/// there is none.
+template <typename Wanted>
+uint32_t SurfaceWalk::turns(uint32_t& triangle, uint32_t around, bool forward, const Wanted& wanted) const {
+  for (uint32_t count = 0; count < kMaxTurns; ++count) {
+    if (wanted(triangle)) return count;
+    triangle = beyond(side_at(triangle, around, forward));
+    if (triangle == kNone) break;
+  }
+  return kNone;
+}
+
+/// Finds the shortest path around the points that both ends became, for folds and borders where no plane meets the
+/// triangles between them.
+bool SurfaceWalk::find_around(uint32_t a, uint32_t b, const Place& from, const Place& goal, EdgePath& out) {
+  crossing_count_ = out.first;
+  const uint32_t first = mesh_.stands_for[a], second = mesh_.stands_for[b];
+  const auto reached = [&](uint32_t t) { return at(t, goal); };
+  const auto has_second = [&](uint32_t t) { return has(t, second); };
+  uint32_t start = kNone, best = kNone;
+  bool forward[2] = {};
+  const auto consider = [&](uint32_t begin) {
+    if (!has(begin, first)) return;
+    for (int way = 0; way < 4; ++way) {
+      uint32_t t = begin;
+      const uint32_t one = first == second ? 0 : turns(t, first, (way & 1) != 0, has_second);
+      if (one == kNone) continue;
+      const uint32_t two = turns(t, second, (way & 2) != 0, reached);
+      if (two == kNone || one + two >= best) continue;
+      best = one + two, start = begin, forward[0] = (way & 1) != 0, forward[1] = (way & 2) != 0;
+    }
+  };
+  if (from.state == Place::State::kTriangle)
+    consider(from.number);
+  else
+    for (const uint32_t t : simplified_.around(first))
+      if (has_second(t)) consider(t);
+  if (best == kNone) return false;
+  out.start = start;
+  double on = 0.0;
+  uint32_t t = start;
+  for (; first != second && !has_second(t); t = beyond(side_at(t, first, forward[0])))
+    cross_side(a, b, side_at(t, first, forward[0]), on);
+  for (; !reached(t); t = beyond(side_at(t, second, forward[1]))) cross_side(a, b, side_at(t, second, forward[1]), on);
+  return true;
+}
+
+/// Adds a crossing of a side where it is near the edge from a to b.
+/// @param on parameter of the last crossing on the edge; set to that of this one
+void SurfaceWalk::cross_side(uint32_t a, uint32_t b, uint32_t corner, double& on) {
+  const DVec3 &p = source_.points[a], &q = source_.points[b];
+  const DVec3 &c = point(point_at(corner)), &d = point(point_at(next_corner(corner)));
+  const DVec3 edge = q - p, side = d - c, between = p - c;
+  const double ee = glm::dot(edge, edge), es = glm::dot(edge, side), ss = glm::dot(side, side);
+  const double eb = glm::dot(edge, between), sb = glm::dot(side, between), scale = ee * ss - es * es;
+  if (scale > 0.0) on = std::clamp((es * sb - eb * ss) / scale, on, 1.0);
+  const DVec3 there = p + on * edge;
+  const double t = ss > 0.0 ? std::clamp(glm::dot(there - c, side) / ss, 0.0, 1.0) : 0.0;
+  const DVec3 crossing = c + t * side, off = crossing - there;
+  add(opposite_[corner] / 4, crossing, on, glm::dot(off, off));
 }
 
 /// Reserves space for the crossings of one more path.

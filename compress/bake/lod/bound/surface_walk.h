@@ -19,7 +19,8 @@ class SurfaceWalk {
 public:
   static constexpr uint32_t kNone = ~0u;
 
-  /// The image of a source point: a simplified point (kPoint) or a position in a simplified triangle (kTriangle).
+  /// The image of a source point: a simplified point (kPoint) or a position in a simplified triangle (kTriangle). Any
+  /// position is a valid image; far ones only give loose bounds.
   struct Place {
     enum class State : uint8_t { kUnknown, kNowhere, kPoint, kTriangle };
     DVec3 at{};             ///< the image
@@ -106,7 +107,20 @@ private:
   bool leave_triangle(const Slice& slice, uint32_t triangle, Exit& out) const;
   void enter(const Slice& slice, uint32_t corner, Exit& exit) const;
   void find_place(uint32_t source, Place& out) const;
+  void project(uint32_t source, Place& out) const;
+  void place_nearest(uint32_t source, Place& out) const;
   void find_path(uint32_t edge, uint32_t a, uint32_t b, EdgePath& out);
+  bool find_straight(uint32_t a, uint32_t b, const Place& from, const Place& goal, EdgePath& out);
+  bool find_around(uint32_t a, uint32_t b, const Place& from, const Place& goal, EdgePath& out);
+  template <typename Wanted>
+  uint32_t turns(uint32_t& triangle, uint32_t around, bool forward, const Wanted& wanted) const;
+  /// The side of a triangle that starts (forward) or ends at one of its points, as the corner where it starts.
+  uint32_t side_at(uint32_t triangle, uint32_t at, bool forward) const {
+    const uint32_t* p = &corner_points_[4 * size_t{triangle}];
+    const uint32_t i = p[0] == at ? 0u : p[1] == at ? 1u : 2u;
+    return 4 * triangle + (forward ? i : i == 0 ? 2 : i - 1);
+  }
+  void cross_side(uint32_t a, uint32_t b, uint32_t corner, double& on);
   bool cross(const Slice& slice, Exit& exit, const Place& goal);
   bool find_along(uint32_t edge, uint32_t from, uint32_t to, EdgePath& out) const;
   bool step_aside(uint32_t triangle, const Place& goal, const DVec3& end);

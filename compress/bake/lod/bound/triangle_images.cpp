@@ -138,27 +138,29 @@ bool TriangleImages::find(uint32_t triangle, Image& out) {
   return true;
 }
 
-void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vector<OverlayPiece>& pieces) {
+void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vector<Piece>& pieces) {
   struct Measurer {
     TriangleImages& images;
     uint32_t source;
     Word word;
-    std::array<double, kMax> distances2;
+    std::array<double, kMax> there2, back2;
     DVec3 point; ///< last position on the source outline; `image` is its image
     DVec3 image;
     double of_both;
 
     void begin(uint32_t simplified) {
       word.triangles[word.count] = simplified;
-      distances2[word.count++] = 0.0;
+      there2[word.count] = back2[word.count] = 0.0;
+      ++word.count;
     }
     /// Accounts for the last position in the current simplified triangle.
     void measure() {
       const Triangle& t = images.mesh_.triangles[word.triangles[word.count - 1]].points;
       const SurfaceWalk& walk = images.walk_;
-      const DVec3 there = point - nearest_point(point, walk.point(t.x), walk.point(t.y), walk.point(t.z));
-      const double larger2 = std::max(glm::dot(there, there), images.distance2_from(source, image));
-      distances2[word.count - 1] = std::max(distances2[word.count - 1], std::min(of_both, larger2));
+      const DVec3 d = point - nearest_point(point, walk.point(t.x), walk.point(t.y), walk.point(t.z));
+      double &there = there2[word.count - 1], &back = back2[word.count - 1];
+      there = std::max(there, std::min(of_both, glm::dot(d, d)));
+      back = std::max(back, std::min(of_both, images.distance2_from(source, image)));
     }
     void take_place(int i) {
       const uint32_t number = images.points(source)[i];
@@ -189,11 +191,12 @@ void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vec
       begin(into);
       measure();
     }
-  } outline{*this, triangle, {}, {}, {}, {}, 0.0};
+  } outline{*this, triangle, {}, {}, {}, {}, {}, 0.0};
   follow(triangle, outline);
   const double inside2 = image.point == kNone ? 0.0 : distance2_from(triangle, walk_.point(image.point));
   for (uint32_t i = 0; i < outline.word.count; ++i)
-    pieces.push_back({outline.word.triangles[i], 0, std::sqrt(std::max(outline.distances2[i], inside2))});
+    pieces.push_back({outline.word.triangles[i], std::sqrt(std::max(outline.there2[i], inside2)),
+                      std::sqrt(std::max(outline.back2[i], inside2))});
 }
 
 /// The interval's contribution to the signed area of the image in its triangle, as (twice that area) x (twice the

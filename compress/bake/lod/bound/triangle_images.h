@@ -23,6 +23,13 @@ public:
     uint32_t point; ///< the interior point, or kNone
   };
 
+  /// The part of an image in one simplified triangle. Bounds of the distances between nearest points: `there` of the
+  /// source triangle's part from the simplified triangle, `back` of the image from the source triangle.
+  struct Piece {
+    uint32_t simplified;
+    double there, back;
+  };
+
   /// Both arguments must outlive this object.
   TriangleImages(SurfaceWalk& walk, const SimplifyMesh& mesh)
       : walk_(walk), mesh_(mesh), met_(4 * walk.source().triangles.size() + kMax),
@@ -32,10 +39,9 @@ public:
   bool find(uint32_t triangle, Image& out);
   std::span<const uint32_t> met(const Image& image) const { return std::span(met_).subspan(image.first, image.count); }
 
-  /// Appends one piece per simplified triangle that the outline crosses, with an upper bound of the distance there to
-  /// the nearest points, both ways.
+  /// Appends one piece per simplified triangle that the outline crosses.
   /// @param triangle find() returned true for it
-  void look_closer(uint32_t triangle, const Image& image, std::vector<OverlayPiece>& pieces);
+  void look_closer(uint32_t triangle, const Image& image, std::vector<Piece>& pieces);
 
   /// Adds to `shares`, for each wanted simplified triangle, the fraction of its area that the image covers. Parts of
   /// the image that are seen from behind count as negative.

@@ -185,9 +185,7 @@ double Overlay::nearest_distance(const OverlayPiece& piece) const {
   double largest = 0.0;
   for (size_t i = 0; i < polygon.count; ++i) {
     const OverlayPoint& c = polygon.corners[i];
-    const DVec3 on = triangle_[0] + c.l1 * e1 + c.l2 * e2, over = on + c.height * direction_;
-    largest = std::max({largest, surface_.distance(on, piece.triangle),
-                        glm::length(over - nearest_point(over, triangle_[0], triangle_[1], triangle_[2]))});
+    largest = std::max(largest, surface_.distance(triangle_[0] + c.l1 * e1 + c.l2 * e2, piece.triangle));
   }
   return polygon.count < 3 ? piece.distance : std::min(largest, piece.distance);
 }

@@ -79,7 +79,8 @@ public:
     return overlay_near([](uint32_t, double) { return true; }, pieces);
   }
 
-  /// The maximum distance of a piece of the last overlay() to nearest points; at most the distance along the direction.
+  /// The maximum distance of a piece of the last overlay() from its surface triangle; at most the distance along the
+  /// direction. The surface may be farther from the overlaid triangle than that.
   double nearest_distance(const OverlayPiece& piece) const;
 
 private:
