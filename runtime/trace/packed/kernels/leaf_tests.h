@@ -4,7 +4,7 @@
 #include "runtime/trace/packed/kernels/triangle_test.h"
 
 /// Tests the triangles of a batch against the rays that reach its leaf, in one of three arrangements:
-///  - test_triangles(): one ray against eight triangles, one triangle per SIMD lane.
+///  - test_triangles(), test_one_ray(): one ray against eight triangles, one triangle per SIMD lane.
 ///  - test_several_rays(): several rays in one register, each against four or eight triangles.
 ///  - test_rays(): one triangle against one ray per lane.
 /// All three perform the same arithmetic, so they return the same bits.
@@ -28,6 +28,28 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& no
       Lanes::set(group.end[ray])};
   return test_lanes<Lanes, true, kUseResidual>(vertex, origin, normal, rest, lanes, fine, (1u << batch.count) - 1, hits,
                                                exact_count);
+}
+
+/// Up to this number of rays, any hits are found ray by ray: eight lanes of one ray are no more work than a wide
+/// register that is half empty, and rays of different major axes need no loop over axes.
+constexpr uint32_t kFewRays = 3;
+
+/// Whether one ray hits a triangle of a batch, for any hits. Most leaves are visited by a single ray of a group.
+template <typename Lanes, typename Fine>
+[[gnu::always_inline]] inline bool test_one_ray(const DecodedBatch& batch, const BatchNormals& normals,
+                                                const RayGroup& group, uint32_t ray, Fine fine, uint64_t& exact_count) {
+  const uint32_t axis[3] = {group.axis[0][ray], group.axis[1][ray], group.axis[2][ray]};
+  const TestRay& from = group.tests[ray];
+  const auto vertex = [&](uint32_t k, uint32_t corner) { return Lanes::load(batch.vertex[axis[k]][corner]); };
+  const auto origin = [&](uint32_t k) { return Lanes::set(from.origin[k]); };
+  const auto normal = [&](uint32_t k) { return Lanes::load(normals.normal[axis[k]]); };
+  const auto rest = [](uint32_t) { return Lanes::set(0.0f); };
+  const RayLanes<Lanes> lanes{{Lanes::set(from.shear[0]), Lanes::set(from.shear[1]), Lanes::set(from.shear[2])},
+                              Lanes::set(from.begin),
+                              Lanes::set(from.end)};
+  LaneHits<Lanes> hits;
+  return test_lanes<Lanes, false, false>(vertex, origin, normal, rest, lanes, fine, (1u << batch.count) - 1, hits,
+                                         exact_count) != 0;
 }
 
 /// The first kTriangles triangles of a batch, repeated until they fill a register. Coordinates are permuted to Woop's
@@ -138,6 +160,15 @@ template <typename Lanes, bool kUseResidual, typename Fine>
 inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                               uint64_t rays, Fine fine, uint64_t& exact) {
   using WideLanes = typename Lanes::WideLanes;
+  if constexpr (!kUseResidual) // Nearest hits are filtered by this function for more rays only.
+    if (count_ones(rays) <= kFewRays) {
+      uint64_t hit = 0;
+      for (; rays != 0; rays &= rays - 1) {
+        const uint32_t ray = first_bit(rays);
+        hit |= uint64_t{test_one_ray<Lanes>(batch, normals, group, ray, fine, exact)} << ray;
+      }
+      return hit;
+    }
   return batch.count <= 4 ? test_several_rays<WideLanes, 4, kUseResidual>(batch, normals, group, rays, fine, exact)
                           : test_several_rays<WideLanes, 8, kUseResidual>(batch, normals, group, rays, fine, exact);
 }

@@ -51,7 +51,7 @@ private:
   void trace_batches(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
                      uint64_t rays, Fine fine) {
     if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
-    while (count > 0) {
+    while (count > 0 && rays != 0) {
       const DecodedBatch& batch = decoded(cluster, first, count);
       if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
       const Place place{placement, cluster, first};
