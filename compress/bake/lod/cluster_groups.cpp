@@ -5,7 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <numeric>
-#include <tuple>
+#include <utility>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -21,8 +21,9 @@ constexpr uint32_t kFewClusters = kGroupTargetClusters / 3; // smaller groups jo
 
 /// A triangle side on the border of a cluster.
 struct BorderEdge {
-  uint32_t a, b, cluster;
-  bool operator<(const BorderEdge& o) const { return std::tie(a, b, cluster) < std::tie(o.a, o.b, o.cluster); }
+  uint64_t ends; ///< position numbers: the higher one + 2^32 x the lower one
+  uint32_t cluster;
+  bool operator<(const BorderEdge& o) const { return ends != o.ends ? ends < o.ends : cluster < o.cluster; }
 };
 
 uint32_t begin_of(std::span<const uint32_t> ends, uint32_t i) { return i == 0 ? 0 : ends[i - 1]; }
@@ -77,7 +78,7 @@ public:
         if (const uint32_t p = t[k], q = t[k == 2 ? 0 : k + 1]; shared_[p] + shared_[q] == 2) add(p, q, cluster);
     }
     for (const uint32_t slot : found_)
-      if (const Edge& e = slots_[slot]; e.once) out.push_back({e.a, e.b, cluster});
+      if (const Edge& e = slots_[slot]; e.once) out.push_back({uint64_t{e.a} << 32 | e.b, cluster});
   }
 
 private:
@@ -134,21 +135,21 @@ struct Adjacency {
 Adjacency find_adjacency(const ClusterRuns& clusters) {
   constexpr size_t kMaxClustersPerEdge = 8; // of edges with more clusters, only the first ones are linked
   const std::vector<BorderEdge> edges = border_edges(clusters);
-  std::vector<std::pair<uint32_t, uint32_t>> pairs;
+  std::vector<uint64_t> pairs; // the second cluster + 2^32 x the first one
   for (size_t i = 0, next; i < edges.size(); i = next) {
-    for (next = i + 1; next < edges.size() && edges[next].a == edges[i].a && edges[next].b == edges[i].b;) ++next;
+    for (next = i + 1; next < edges.size() && edges[next].ends == edges[i].ends;) ++next;
     const size_t end = std::min(next, i + kMaxClustersPerEdge);
     for (size_t k = i; k < end; ++k)
       for (size_t l = i; l < end; ++l)
-        if (l != k) pairs.emplace_back(edges[k].cluster, edges[l].cluster);
+        if (l != k) pairs.push_back(uint64_t{edges[k].cluster} << 32 | edges[l].cluster);
   }
   tbb::parallel_sort(pairs.begin(), pairs.end());
   Adjacency result;
   result.first.assign(clusters.ends.size() + 1, 0);
   for (size_t i = 0, next; i < pairs.size(); i = next) {
     for (next = i + 1; next < pairs.size() && pairs[next] == pairs[i];) ++next;
-    result.links.push_back({pairs[i].second, static_cast<uint32_t>(next - i)});
-    ++result.first[pairs[i].first + 1];
+    result.links.push_back({static_cast<uint32_t>(pairs[i]), static_cast<uint32_t>(next - i)});
+    ++result.first[(pairs[i] >> 32) + 1];
   }
   std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
   return result;

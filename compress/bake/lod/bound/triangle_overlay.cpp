@@ -66,9 +66,10 @@ Overlay::Overlay(const OverlaySurface& surface) : surface_(surface) {}
 void Overlay::prepare() {
   if (const size_t count = surface_.points.size(); count > stamps_.size())
     projected_.resize(count), outside_.resize(count), stamps_.resize(count);
-  corners_.reserve(3 * surface_.triangles.size());
+  corners_.resize(3 * surface_.triangles.size());
+  uint32_t* corner = corners_.data();
   for (const LodTriangle& t : surface_.triangles)
-    for (int i = 0; i < 3; ++i) corners_.push_back(t.points[i]);
+    for (int i = 0; i < 3; ++i) *corner++ = t.points[i];
   task_.corners = corners_.data();
   task_.projected = projected_.data();
   task_.outside = outside_.data();

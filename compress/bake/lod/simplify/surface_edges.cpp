@@ -120,28 +120,21 @@ private:
       uses_.push_back({std::exchange(first_[a], found), triangle, p == a});
       out_.ends.push_back({a, b});
     } else {
-      uses_[found].border = uses_[found].border && folds_back(uses_[found], triangle, p == a);
-      uses_[found].sharp = !uses_[found].two && is_sharp(uses_[found], triangle, p == a);
-      uses_[found].two = true;
+      meet(uses_[found], triangle, p == a);
       if (many_seams_) join(found, triangle);
     }
     return found;
   }
 
-  /// Whether the triangle lies on the same side of the edge as the edge's first triangle, as in a sheet of two layers.
-  /// Such an edge is a border of the sheet.
-  bool folds_back(const EdgeUse& edge, uint32_t triangle, bool forward) const {
+  /// Updates an edge for one more triangle. Where that lies on the same side as the edge's first triangle, as in a
+  /// sheet of two layers, the edge is a border of the sheet.
+  void meet(EdgeUse& edge, uint32_t triangle, bool forward) const {
     const DVec3 &m = out_.area_normals[edge.triangle], &n = out_.area_normals[triangle];
-    const double dot = glm::dot(m, n);
-    if ((dot > 0.0) != (edge.forward == forward)) return false;
-    return dot * dot > kFolded * kFolded * glm::dot(m, m) * glm::dot(n, n);
-  }
-
-  /// Whether the surface turns sharply between the edge's first triangle and this one.
-  bool is_sharp(const EdgeUse& edge, uint32_t triangle, bool forward) const {
-    const DVec3 &m = out_.area_normals[edge.triangle], &n = out_.area_normals[triangle];
-    const double dot = edge.forward == forward ? -glm::dot(m, n) : glm::dot(m, n);
-    return dot < 0.0 || dot * dot < kSharp * kSharp * glm::dot(m, m) * glm::dot(n, n);
+    const double dot = edge.forward == forward ? -glm::dot(m, n) : glm::dot(m, n); // of a surface through the edge
+    const double dot2 = dot * dot, areas2 = glm::dot(m, m) * glm::dot(n, n);
+    edge.border = edge.border && dot < 0.0 && dot2 > kFolded * kFolded * areas2;
+    edge.sharp = !edge.two && (dot < 0.0 || dot2 < kSharp * kSharp * areas2);
+    edge.two = true;
   }
 
   /// Marks seams and creases between the edge's first triangle and this one.
