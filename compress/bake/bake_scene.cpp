@@ -68,6 +68,7 @@ private:
     check_level_chains();
     FileSections sections(scene_, textures_);
     if (config_.purpose == baked::kShading) sections.add_shading(scene_);
+    reserve(sections);
     RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
       packed_[i].record.requirements = requirements.add(scene_, plan_.geometries[i], packed_[i].needs, packed_[i].stats,
@@ -93,6 +94,18 @@ private:
     report_.resumed_geometries = packer_->resumed();
     add_up(scene_, plan_, packed_, report_, diagnostics_);
     return sections.assemble(summary(sections));
+  }
+
+  void reserve(FileSections& sections) const {
+    size_t clusters = 0, bytes = 0;
+    const auto count = [&](const EncodedGeometry& encoded) {
+      clusters += encoded.clusters.size(), bytes += encoded.payload.size();
+    };
+    for (const PackedGeometry& packed : packed_) {
+      count(packed.encoded);
+      for (const EncodedLod::Level& level : packed.lod.levels) count(level.encoded);
+    }
+    sections.reserve(clusters, bytes);
   }
 
   /// Builds proxies from the geometries as they are packed.

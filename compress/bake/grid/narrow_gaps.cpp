@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include "compress/bake/grid/nearest_triangles.h"
 
@@ -145,16 +146,24 @@ private:
   void build() {
     std::vector<Middle> middles(probes_.size());
     for (uint32_t i = 0; i < middles.size(); ++i) middles[i] = {probes_[i].middle(), i};
-    nodes_.reserve(probes_.size() / 2 + 1);
-    add_node(middles, 0);
+    nodes_.resize(node_counts(probes_.size())[0]);
+    add_node(middles, 0, 0);
     std::vector<Probe> ordered(probes_.size());
     for (size_t i = 0; i < ordered.size(); ++i) ordered[i] = probes_[middles[i].probe];
     probes_ = std::move(ordered);
   }
 
-  Bounds add_node(std::span<Middle> middles, uint32_t first) {
-    const size_t index = nodes_.size();
-    nodes_.emplace_back();
+  /// Numbers of nodes over `probes` and over probes + 1 probes.
+  static std::array<size_t, 2> node_counts(size_t probes) {
+    if (probes < kLeafPoints) return {1, 1};
+    const auto [half, more] = node_counts(probes / 2);
+    const size_t even = 1 + 2 * (probes % 2 == 0 ? half : more), odd = 1 + half + more;
+    return {probes == kLeafPoints ? 1 : probes % 2 == 0 ? even : odd, probes % 2 == 0 ? odd : even};
+  }
+
+  /// Adds the nodes of a subtree at `index`. Returns the bounds of its probes.
+  Bounds add_node(std::span<Middle> middles, uint32_t first, size_t index) {
+    constexpr size_t kParallelPoints = 4096; // smaller subtrees are built serially
     Bounds box;
     if (middles.size() <= kLeafPoints) {
       for (const Middle& middle : middles)
@@ -171,9 +180,20 @@ private:
                          const double x = a.position[axis], y = b.position[axis];
                          return x < y || (x == y && a.probe < b.probe);
                        });
-      box = add_node(middles.first(half), first);
-      nodes_[index].right = static_cast<uint32_t>(nodes_.size());
-      box.extend(add_node(middles.subspan(half), first + static_cast<uint32_t>(half)));
+      const size_t right = index + 1 + node_counts(half)[0];
+      nodes_[index].right = static_cast<uint32_t>(right);
+      Bounds of_right;
+      const auto add_left = [&] { box = add_node(middles.first(half), first, index + 1); };
+      const auto add_right = [&] {
+        of_right = add_node(middles.subspan(half), first + static_cast<uint32_t>(half), right);
+      };
+      if (middles.size() >= kParallelPoints) {
+        tbb::parallel_invoke(add_left, add_right);
+      } else {
+        add_left();
+        add_right();
+      }
+      box.extend(of_right);
     }
     nodes_[index].lows = BoxEnds::lows(box), nodes_[index].centre = box.centre(),
     nodes_[index].extent = box.hi - box.lo;
@@ -261,7 +281,8 @@ private:
   /// Finds the nearest triangle per probe.
   void find_hits(const ProbeTree& tree) {
     hits_ = NearestTriangles(tree.probes().size());
-    for (const PlacedPart& placed : parts_.parts()) {
+    tbb::parallel_for(size_t{0}, parts_.parts().size(), [&](size_t part) {
+      const PlacedPart& placed = parts_.parts()[part];
       const Mesh& mesh = parts_.mesh_of(placed);
       const size_t count = mesh.triangles.size();
       tbb::parallel_for(size_t{0}, (count + kBlockTriangles - 1) / kBlockTriangles, [&](size_t block) {
@@ -283,7 +304,7 @@ private:
             test(tree, starts, triangles[i - begin], placed.first_triangle + static_cast<uint32_t>(i));
         }
       });
-    }
+    });
   }
 
   void test(const ProbeTree& tree, const ProbeTree::Starts& starts, const std::array<DVec3, 3>& t, uint32_t number) {

@@ -120,6 +120,11 @@ void FileSections::add_cameras(const Scene& scene) {
   }
 }
 
+void FileSections::reserve(size_t clusters, size_t payload_bytes) {
+  clusters_.reserve(clusters_.size() + clusters);
+  payload_.reserve(payload_.size() + payload_bytes);
+}
+
 void FileSections::add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name) {
   record.name = add_string(name);
   append(record, encoded);

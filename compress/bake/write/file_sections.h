@@ -23,6 +23,9 @@ public:
   /// @param textures the scene's textures in order, or empty: then no material refers to a texture
   FileSections(const Scene& scene, const std::vector<EncodedTexture>& textures);
 
+  /// Makes room for the clusters and streams of geometries that will be added.
+  void reserve(size_t clusters, size_t payload_bytes);
+
   /// Sets the record's ranges, counts, bounds and name, and appends it with its clusters and payload.
   void add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name);
 
