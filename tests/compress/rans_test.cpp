@@ -38,6 +38,33 @@ TEST(Rans, SymbolsComeBack) {
   }
 }
 
+TEST(Rans, SymbolsOfTheMeanOfTwoModelsComeBack) {
+  const std::vector<uint32_t> symbols = skewed_symbols(20000);
+  std::array<NibbleModel, 3> models;
+  RansWriter writer(symbols.size());
+  for (size_t i = 0; i < symbols.size(); ++i) (void)writer.put(models[i % 2], models[2], symbols[i]);
+  const std::vector<uint8_t> bytes = writer.finish();
+  std::array<NibbleModel, 3> copies;
+  RansReader reader(bytes);
+  for (size_t i = 0; i < symbols.size(); ++i) ASSERT_EQ(reader.symbol(copies[i % 2], copies[2]), symbols[i]) << i;
+  EXPECT_TRUE(reader.whole());
+}
+
+TEST(NibbleTable, MeansOfModelsKeepEverySymbolPossible) {
+  NibbleModel low, high;
+  for (int i = 0; i < 3000; ++i) {
+    low.update(0), high.update(15);
+    const NibbleTable mean(low, high);
+    EXPECT_EQ(mean.below(0), 0u);
+    EXPECT_EQ(mean.below(kNibbleSymbols), 1u << kProbabilityBits);
+    for (uint32_t symbol = 0; symbol < kNibbleSymbols; ++symbol) {
+      ASSERT_GE(mean.frequency(symbol), 1u);
+      ASSERT_EQ(mean.find(mean.below(symbol)), symbol);
+      ASSERT_EQ(mean.find(mean.below(symbol + 1) - 1), symbol);
+    }
+  }
+}
+
 TEST(Rans, TruncatedAndLongerInputIsNotWhole) {
   const std::vector<uint32_t> symbols = skewed_symbols(300);
   std::vector<uint8_t> bytes = write(symbols);

@@ -9,12 +9,12 @@
 #include "compress/format/layout/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// Records of a .ptk file, version 10; docs/baked_format.md describes them. All values are little-endian. Every section
+/// Records of a .ptk file, version 11; docs/baked_format.md describes them. All values are little-endian. Every section
 /// starts at a multiple of 64 bytes. Bytes that belong to no field and no section are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 10;
+inline constexpr uint32_t kVersion = 11;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 

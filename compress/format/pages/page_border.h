@@ -11,6 +11,7 @@
 namespace packtrace {
 
 inline constexpr uint32_t kNoPagePoint = ~0u;
+inline constexpr uint32_t kNoPageCorner = ~0u;
 
 /// Border edges at a point, newest first. Two surfaces that touch in a point have one each; kNoPagePoint marks unused
 /// entries.
@@ -28,30 +29,62 @@ struct BorderEnds {
 
 /// A distinct vertex position of a page, and the border of the triangles coded so far there.
 struct PagePoint {
-  LatticePoint position;
+  LatticePoint position{};
   BorderEnds next;                     ///< end points of border edges that begin here, newest first
   BorderEnds previous;                 ///< start points of border edges that end here, newest first
-  BorderEnds apex;                     ///< third corners of the triangles at the edges to `next`
+  BorderEnds apex;                     ///< corners that face the edges to `next`
   uint32_t cluster = 0;                ///< last cluster with a vertex here
   uint16_t vertex = 0;                 ///< newest vertex of that cluster here
   uint16_t normal_count = 0;           ///< 0..2
+  bool known = false;                  ///< whether the position has been coded
+  uint8_t triangles = 0;               ///< triangles here so far, at most kMaxCountedTriangles
+  std::array<uint8_t, 3> error_bits{}; ///< bit widths of the position's coded errors
   std::array<NormalFields, 2> normals; ///< the last two different normals, newest first
   Vec3 unit_normal{0.0f};              ///< the newest, decoded
 };
+inline constexpr uint8_t kMaxCountedTriangles = 7;
 
-/// Adds a triangle to the border: its edges close edges of the border or become part of it.
-/// @param triangle indices of its points
-inline void close_edges(std::vector<PagePoint>& points, const std::array<uint32_t, 3>& triangle) {
+/// The triangles of a page. Corner 3t + i is corner i of triangle t.
+struct PageTriangles {
+  std::vector<uint32_t> points; ///< point of each corner
+  std::vector<uint32_t> across; ///< corner that faces the same edge from the other side, or kNoPageCorner
+
+  static uint32_t next(uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+  static uint32_t previous(uint32_t corner) { return corner % 3 == 0 ? corner + 2 : corner - 1; }
+  uint32_t count() const { return static_cast<uint32_t>(points.size()); }
+
+  void clear() { points.clear(), across.clear(); }
+};
+
+/// Adds a triangle to the page and to its border: edges close edges of the border or become part of it.
+/// @param corners indices of its points
+inline void add_triangle(std::vector<PagePoint>& points, PageTriangles& triangles,
+                         const std::array<uint32_t, 3>& corners) {
+  const uint32_t first = triangles.count();
+  triangles.points.insert(triangles.points.end(), corners.begin(), corners.end());
+  triangles.across.insert(triangles.across.end(), 3, kNoPageCorner);
   for (uint32_t i = 0; i < 3; ++i) {
-    const uint32_t from = triangle[i], to = triangle[(i + 1) % 3];
+    const uint32_t from = corners[i], to = corners[(i + 1) % 3], facing = first + (i + 2) % 3;
     PagePoint &a = points[from], &b = points[to];
+    a.triangles = static_cast<uint8_t>(a.triangles + (a.triangles < kMaxCountedTriangles ? 1 : 0));
     if (a.previous.has(to) && b.next.has(from)) {
       const size_t out = b.next[0] == from ? 0 : 1;
+      triangles.across[facing] = b.apex[out];
+      triangles.across[b.apex[out]] = facing;
       a.previous.erase(a.previous[0] == to ? 0 : 1), b.next.erase(out), b.apex.erase(out);
     } else {
-      a.next.push(to), a.apex.push(triangle[(i + 2) % 3]), b.previous.push(from);
+      a.next.push(to), a.apex.push(facing), b.previous.push(from);
     }
   }
+}
+
+/// Vector between two points in lattice steps; a difference of more than 63 bits wraps.
+inline DVec3 steps_between(const LatticePoint& from, const LatticePoint& to) {
+  DVec3 steps;
+  for (size_t axis = 0; axis < 3; ++axis)
+    steps[static_cast<int>(axis)] =
+        static_cast<double>(static_cast<int64_t>(static_cast<uint64_t>(to[axis]) - static_cast<uint64_t>(from[axis])));
+  return steps;
 }
 
 } // namespace packtrace

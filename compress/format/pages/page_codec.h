@@ -73,8 +73,9 @@ struct PageRecord {
 };
 static_assert(std::is_trivially_copyable_v<PageRecord> && sizeof(PageRecord) == 24);
 
-inline constexpr uint32_t kPagePayload = 1u << 16;            ///< target size: clusters are added to a page up to this
-inline constexpr uint32_t kMaxPagePayload = 2 * kPagePayload; ///< larger, because a page has at least one cluster
+/// Clusters are added to a page up to this size. Small pages learn more from longer pages.
+constexpr uint32_t page_payload(PageCodec codec) { return codec == PageCodec::kSmall ? 1u << 17 : 1u << 16; }
+inline constexpr uint32_t kMaxPagePayload = 1u << 18; ///< larger, because a page has at least one cluster
 inline constexpr uint32_t kMaxPageClusters = 2048;
 /// Limit of decoded bytes per byte on disk, so that a small file cannot request much memory.
 inline constexpr uint64_t kMaxDiskRatio = 1u << 15;

@@ -13,18 +13,23 @@ inline constexpr uint32_t kPageStreams = static_cast<uint32_t>(PageStream::kCoun
 /// Numbers of the adaptive models that code symbols. PageModel documents the selection of a model within a range.
 namespace context {
 inline constexpr uint32_t kStripCorner = 0, kFirstCorner = 1, kSecondCorner = 2, kThirdCorner = 3; // kinds of corners
-// 9 pairs of turns x 4 states of open edges, without and with normals
+// 4 states of open edges x 8 counts of triangles at each of two corners
 inline constexpr uint32_t kTurn = 0;
-inline constexpr uint32_t kStripNaming = kTurn + 72; // 4 pairs of new corners x same turn x 12 states of the guesses
+// 12 states of the guesses x 8 and 4 counts of triangles at the two corners before
+inline constexpr uint32_t kStripNaming = kTurn + 256;
 // 3 corners of a strip's first triangle x 12 states of the guesses
-inline constexpr uint32_t kNaming = kStripNaming + 96;
+inline constexpr uint32_t kNaming = kStripNaming + 384;
 inline constexpr uint32_t kVersion = kNaming + 36;
 inline constexpr uint32_t kVertexAtPointBack = kVersion + 1;
 inline constexpr uint32_t kBack = kVertexAtPointBack + 1; // 4 kinds of corners
 inline constexpr uint32_t kPageBack = kBack + 4;
-inline constexpr uint32_t kPosition = kPageBack + 1; // 20 extents x 3 levels of surprise
+inline constexpr uint32_t kWidths = 46;
+inline constexpr uint32_t kPosition = kPageBack + 1;           // expected width, in halves
+inline constexpr uint32_t kPositionNear = kPosition + kWidths; // 24 widths of errors near by x 16 expected errors
+// without guess: 2 kinds of surroundings x 20 spans x 3 levels of surprise
+inline constexpr uint32_t kPositionAlone = kPositionNear + 384;
 // 3 kinds of the last vertex x 3 counts of known x 3 of other candidates
-inline constexpr uint32_t kNormalChoice = kPosition + 60;
+inline constexpr uint32_t kNormalChoice = kPositionAlone + 120;
 inline constexpr uint32_t kNormalSeam = kNormalChoice + 27;
 inline constexpr uint32_t kNormalX = kNormalSeam + 1; // 16 sizes of the expected error
 inline constexpr uint32_t kNormalY = kNormalX + 16;   // 16 widths of the difference in x

@@ -46,8 +46,10 @@ void append_number(Bytes& to, size_t value) {
 Bytes write_small(PageRecorder& recorder, StreamBits& bits) {
   std::array<NibbleModel, context::kCount> models;
   RansWriter writer(recorder.symbols().size());
-  for (const auto& [context, value] : recorder.symbols())
-    bits[static_cast<size_t>(page_stream_of(context))] += writer.put(models[context], value);
+  for (const auto& [context, second, value] : recorder.symbols())
+    bits[static_cast<size_t>(page_stream_of(context))] += second == PageRecorder::kNoContext
+                                                              ? writer.put(models[context], value)
+                                                              : writer.put(models[context], models[second], value);
   Bytes page;
   append_number(page, recorder.fields().size());
   append(page, recorder.fields());
@@ -173,7 +175,7 @@ private:
 };
 
 /// A cluster's payload ends where the next cluster's begins.
-std::vector<PageRange> split_into_pages(const BakedSections& sections) {
+std::vector<PageRange> split_into_pages(const BakedSections& sections, PageCodec codec) {
   std::vector<PageRange> pages;
   for (const baked::GeometryRecord& g : sections.geometries)
     for (uint32_t i = 0; i < g.cluster_count; ++i) {
@@ -181,7 +183,7 @@ std::vector<PageRange> split_into_pages(const BakedSections& sections) {
       const uint64_t begin = uint64_t{4} * record->payload_offset;
       const uint64_t end = i + 1 < g.cluster_count ? uint64_t{4} * record[1].payload_offset : g.payload_bytes;
       const auto bytes = static_cast<uint32_t>(end - begin);
-      if (pages.empty() || pages.back().payload_bytes + bytes > baked::kPagePayload ||
+      if (pages.empty() || pages.back().payload_bytes + bytes > baked::page_payload(codec) ||
           pages.back().cluster_count == baked::kMaxPageClusters)
         pages.push_back({g.first_cluster + i, g.payload_offset + begin, 0, 0});
       ++pages.back().cluster_count;
@@ -207,7 +209,7 @@ std::pair<Bytes, baked::NodeForm> encode_nodes(ZSTD_CCtx* zstd, const BakedSecti
 std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec) {
   const BakedSections& sections = file.sections();
   const std::span<const std::byte> bytes = file.bytes();
-  const std::vector<PageRange> ranges = split_into_pages(sections);
+  const std::vector<PageRange> ranges = split_into_pages(sections, codec);
   std::vector<EncodedPage> pages(ranges.size());
   tbb::enumerable_thread_specific<PageEncoder> encoders([&] { return PageEncoder(sections, codec); });
   tbb::parallel_for(size_t{0}, ranges.size(), [&](size_t i) { pages[i] = encoders.local().run(ranges[i]); });

@@ -132,14 +132,6 @@ private:
     return fold_normal(encoding_, {chart, limit(predicted.x + limit(dx)), limit(predicted.y + limit(dy))});
   }
 
-  /// Vector between two points; a difference of more than 63 bits wraps.
-  static DVec3 steps_between(const LatticePoint& from, const LatticePoint& to) {
-    DVec3 steps;
-    for (size_t axis = 0; axis < 3; ++axis)
-      steps[static_cast<int>(axis)] = static_cast<double>(static_cast<int64_t>(wrap(to[axis]) - wrap(from[axis])));
-    return steps;
-  }
-
   NormalSurroundings surroundings(uint32_t v) const {
     const Vertex& vertex = vertices_[v];
     NormalSurroundings s{.face_sum = vertex.face_sum, .triangle_count = vertex.triangle_count};

@@ -50,6 +50,9 @@ public:
   }
 
   uint32_t symbol(uint32_t context, uint32_t) { return symbols_.symbol(models_[context]); }
+  uint32_t symbol(uint32_t first, uint32_t second, uint32_t) {
+    return symbols_.symbol(models_[first], models_[second]);
+  }
   uint64_t raw(uint32_t, uint64_t, uint32_t bits) { return fields_.take(bits); }
   bool whole() const { return symbols_.whole() && fields_.whole(); }
 

@@ -18,13 +18,18 @@ public:
   static constexpr bool kDecodes = false;
   static constexpr uint32_t kNoPoint = ~0u;
 
+  static constexpr uint16_t kNoContext = 0xffff;
   struct Symbol {
-    uint16_t context;
+    uint16_t context, second; ///< models whose mean is used; second: kNoContext if only the first is
     uint8_t value;
   };
 
   uint32_t symbol(uint32_t context, uint32_t value) {
-    symbols_.push_back({static_cast<uint16_t>(context), static_cast<uint8_t>(value)});
+    symbols_.push_back({static_cast<uint16_t>(context), kNoContext, static_cast<uint8_t>(value)});
+    return value;
+  }
+  uint32_t symbol(uint32_t first, uint32_t second, uint32_t value) {
+    symbols_.push_back({static_cast<uint16_t>(first), static_cast<uint16_t>(second), static_cast<uint8_t>(value)});
     return value;
   }
   uint64_t raw(uint32_t context, uint64_t value, uint32_t bits) {

@@ -9,11 +9,13 @@
 #include "compress/format/pages/page_border.h"
 #include "compress/format/pages/page_cluster.h"
 #include "compress/format/pages/page_contexts.h"
+#include "compress/format/pages/point_order.h"
+#include "compress/format/pages/position_predictor.h"
 #include "compress/format/pages/value_coder.h"
 
 namespace packtrace {
 
-/// Codes the triangles of a page's clusters and the positions of their vertices. See PageModel for Coder.
+/// Codes the triangles of a page's clusters, then the positions of their new points. See PageModel for Coder.
 ///
 /// Points are the distinct vertex positions of a page, in order of first use. The border of the triangles coded so far
 /// is stored as up to two outgoing and two incoming edges per point. A triangle that continues the surface closes a
@@ -44,6 +46,8 @@ protected:
   /// Call before the first cluster of each page.
   void begin_surface() {
     points_.clear();
+    triangles_.clear();
+    predictor_.begin();
     cluster_ = 0;
     fault_ = false;
   }
@@ -53,23 +57,21 @@ protected:
     ++cluster_;
     values_ = &c;
     reserve();
+    const auto first_point = static_cast<uint32_t>(points_.size());
+    const uint32_t first_corner = triangles_.count();
     const uint32_t triangle_count = c.triangle_count;
     vertex_count_ = 0, corner_count_ = 0;
     uint32_t restarts = 0;
     std::array<Corner, 3> t{};
-    uint32_t turns = 8; // the last two turns as base-3 digits; 2 is a restart
     for (uint32_t i = 0; i < triangle_count && !fault_; ++i) {
       Turn turn = Turn::kRestart;
       if (i > 0) {
-        const uint32_t open_right = points_[t[1].point].next.has(t[2].point),
-                       open_left = points_[t[2].point].next.has(t[0].point);
-        turn = static_cast<Turn>(std::min(
-            coder_.symbol(context::kTurn + 36 * (c.has_normals ? 1u : 0u) + turns * 4 + open_right + 2 * open_left,
-                          static_cast<uint32_t>(c.turns[i])),
-            2u));
+        const PagePoint &p = points_[t[0].point], &q = points_[t[1].point], &r = points_[t[2].point];
+        const uint32_t open = (q.next.has(t[2].point) ? 1u : 0u) + (r.next.has(t[0].point) ? 2u : 0u);
+        const uint32_t context = context::kTurn + (open * 8 + p.triangles) * 8 + q.triangles;
+        turn = static_cast<Turn>(std::min(coder_.symbol(context, static_cast<uint32_t>(c.turns[i])), 2u));
       }
       c.turns[i] = turn;
-      turns = (turns * 3 + static_cast<uint32_t>(turn)) % 9;
       if (turn == Turn::kRestart) {
         ++restarts;
         code_restart(t);
@@ -78,16 +80,19 @@ protected:
         const Corner opposite = t[left];
         t = {t[2 - 2 * left], t[1 + left], {}};
         guess_third(t, opposite.point);
-        basis_ = {t[0].point, t[1].point, opposite.point};
-        t[2] = code_corner(context::kStripNaming + 12 * (2 * history_ + (c.turns[i] == c.turns[i - 1] ? 1 : 0)),
-                           context::kStripCorner, {t[0].vertex, t[1].vertex});
+        const uint32_t before = std::clamp<uint32_t>(points_[t[0].point].triangles, 3, 6) - 3;
+        t[2] = code_corner({context::kStripNaming + points_[t[1].point].triangles * 4 + before, 32},
+                           context::kStripCorner, {t[0].vertex, t[1].vertex}, opposite.point);
       }
       corners_of_[i] = {t[0].vertex, t[1].vertex, t[2].vertex};
-      close_edges(points_, {t[0].point, t[1].point, t[2].point});
+      add_triangle(points_, triangles_, {t[0].point, t[1].point, t[2].point});
     }
     c.vertex_count = vertex_count_;
     c.corner_count = corner_count_;
     c.strip_count = restarts;
+    if (fault_) return;
+    code_positions(first_point, first_corner);
+    for (uint32_t v = 0; v < vertex_count_; ++v) c.positions[v] = points_[vertices_[v].point].position;
   }
 
   ClusterValues* values_ = nullptr;
@@ -97,8 +102,6 @@ protected:
   std::array<std::array<uint16_t, 3>, kMaxClusterTriangles> corners_of_;
 
 private:
-  static constexpr uint32_t kMaxExtent = 19;
-
   /// A triangle corner: a point, and the cluster's vertex at that point.
   struct Corner {
     uint32_t point = 0;
@@ -110,53 +113,24 @@ private:
       points_.reserve(2 * points_.capacity() + kMaxClusterVertices);
   }
 
-  /// Bit width of the span of three coordinates.
-  static uint32_t extent(int64_t a, int64_t b, int64_t c) {
-    const int64_t lo = std::min({a, b, c}), hi = std::max({a, b, c});
-    return static_cast<uint32_t>(std::bit_width(wrap(hi) - wrap(lo)));
-  }
-
   void guess_third(const std::array<Corner, 3>& t, uint32_t opposite) {
     guess_ = {points_[t[1].point].previous.pick(opposite), points_[t[0].point].next.pick(opposite)};
   }
 
   void code_restart(std::array<Corner, 3>& t) {
     const Corner before = t[2];
-    const bool first = points_.empty();
     guess_ = {kNone, kNone};
-    if (first) {
-      basis_ = {kNone, kNone, kNone};
-      extent_ = {kMaxExtent, kMaxExtent, kMaxExtent};
-    } else {
-      guess_ = {points_[before.point].previous[0], points_[before.point].next[0]};
-      basis_ = {before.point, kNone, kNone};
-    }
-    t[0] = code_corner(context::kNaming, context::kFirstCorner, {kNoVertex, kNoVertex});
+    if (!points_.empty()) guess_ = {points_[before.point].previous[0], points_[before.point].next[0]};
+    t[0] = code_corner({context::kNaming}, context::kFirstCorner, {kNoVertex, kNoVertex}, kNone);
     const PagePoint& p = points_[t[0].point];
     guess_ = {p.previous[0], p.next[0]};
-    basis_ = {t[0].point, kNone, kNone};
-    t[1] = code_corner(context::kNaming + 12, context::kSecondCorner, {t[0].vertex, kNoVertex});
+    t[1] = code_corner({context::kNaming + 12}, context::kSecondCorner, {t[0].vertex, kNoVertex}, kNone);
     const PagePoint& b = points_[t[1].point];
     // Third corner of the triangle on the other side of the first two corners, if there is one.
-    const uint32_t apex = b.next.has(t[0].point) ? b.apex[b.next[0] == t[0].point ? 0 : 1] : kNone;
+    uint32_t apex = kNone;
+    if (b.next.has(t[0].point)) apex = triangles_.points[b.apex[b.next[0] == t[0].point ? 0 : 1]];
     guess_third(t, apex);
-    basis_ = {t[0].point, t[1].point, apex != kNone ? apex : t[0].point};
-    t[2] = code_corner(context::kNaming + 24, context::kThirdCorner, {t[0].vertex, t[1].vertex});
-  }
-
-  /// Predicts a new point: at p + q - o of the basis, or at p, or at 0. Also sets extent_, the spans that select the
-  /// contexts of the errors.
-  std::array<uint64_t, 3> predict() {
-    std::array<uint64_t, 3> prediction{};
-    if (basis_[0] == kNone) return prediction;
-    const LatticePoint& p = points_[basis_[0]].position;
-    if (basis_[1] == kNone) return {wrap(p[0]), wrap(p[1]), wrap(p[2])}; // extent_ keeps the last span
-    const LatticePoint &q = points_[basis_[1]].position, &o = points_[basis_[2]].position;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      prediction[axis] = wrap(p[axis]) + wrap(q[axis]) - wrap(o[axis]);
-      extent_[axis] = std::min(extent(p[axis], q[axis], o[axis]), kMaxExtent);
-    }
-    return prediction;
+    t[2] = code_corner({context::kNaming + 24}, context::kThirdCorner, {t[0].vertex, t[1].vertex}, apex);
   }
 
   /// Symbols that name a corner.
@@ -190,13 +164,18 @@ private:
     return name;
   }
 
-  Corner code_corner(uint32_t names, uint32_t kind, std::array<uint16_t, 2> neighbours) {
+  /// Models that code the name of a corner: one per state of the guesses, `stride` apart.
+  struct NameModels {
+    uint32_t first, stride = 1;
+  };
+
+  /// @param opposite point across the edge of the corners before, or kNone
+  Corner code_corner(NameModels names, uint32_t kind, std::array<uint16_t, 2> neighbours, uint32_t opposite) {
     ClusterValues& c = *values_;
     auto [naming, point, vertex, fresh] = name_corner();
     const bool same = guess_[0] == guess_[1];
     const uint32_t state = guess_state(guess_[0]) * 4 + (same ? 3 : guess_state(guess_[1]));
-    naming = coder_.symbol(names + state, naming);
-    history_ = (2 * history_ + (naming == kNewPoint ? 1 : 0)) & 3u;
+    naming = coder_.symbol(names.first + state * names.stride, naming);
     if (corner_count_ >= kMaxClusterCorners) naming = kInvalidNaming;
     switch (naming) {
     case kNewPoint:
@@ -235,8 +214,7 @@ private:
     if (fresh) {
       if (vertex_count_ >= kMaxClusterVertices) return fail();
       vertex = static_cast<uint16_t>(vertex_count_++);
-      vertices_[vertex] = {point, neighbours, basis_[2] != basis_[0] ? basis_[2] : kNone, 0, DVec3(0.0), Vec3(0.0f)};
-      c.positions[vertex] = points_[point].position;
+      vertices_[vertex] = {point, neighbours, opposite, 0, DVec3(0.0), Vec3(0.0f)};
       points_[point].cluster = cluster_;
       points_[point].vertex = vertex;
     }
@@ -268,28 +246,45 @@ private:
 
   uint32_t add_point() {
     const auto number = static_cast<uint32_t>(points_.size());
-    LatticePoint position{};
-    if constexpr (!kDecodes) position = values_->positions[vertex_count_];
-    const std::array<uint64_t, 3> prediction = predict();
-    uint32_t surprise = 0; // error of the axis before relative to its span; 0 for x
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const uint32_t e = extent_[axis];
-      const auto delta = static_cast<int64_t>(wrap(position[axis]) - prediction[axis]);
-      const int64_t coded = difference(context::kPosition + e * 3 + surprise, delta);
-      position[axis] = static_cast<int64_t>(prediction[axis] + wrap(coded));
-      const auto width = static_cast<uint32_t>(std::bit_width(wrap(coded < 0 ? ~coded : coded)));
-      surprise = width == 0 ? 0 : width + 2 < e ? 1 : 2;
+    PagePoint& point = points_.emplace_back();
+    if constexpr (!kDecodes) {
+      point.position = values_->positions[vertex_count_];
+      coder_.add_point(point.position, number);
     }
-    points_.emplace_back().position = position;
-    if constexpr (!kDecodes) coder_.add_point(position, number);
     return number;
+  }
+
+  /// Codes the positions of the points that the cluster's triangles added.
+  void code_positions(uint32_t first_point, uint32_t first_corner) {
+    order_.begin(triangles_, static_cast<uint32_t>(points_.size()), first_point, first_corner);
+    for (uint32_t i = 0; i < order_.count(); ++i) {
+      const uint32_t number = order_.next();
+      code_position(number);
+      order_.learn(number);
+    }
+  }
+
+  void code_position(uint32_t number) {
+    predictor_.predict(points_, triangles_, order_, number);
+    PagePoint& point = points_[number];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const auto [first, second, mixed] = predictor_.models(axis);
+      const uint64_t predicted = wrap(predictor_.coordinate(axis));
+      auto error = static_cast<int64_t>(wrap(point.position[axis]) - predicted);
+      error = mixed ? difference(first, second, error) : difference(first, error);
+      predictor_.learn_error(error);
+      point.position[axis] = static_cast<int64_t>(predicted + wrap(error));
+    }
+    point.known = true;
+    point.error_bits = predictor_.error_bits();
+    predictor_.learn_position(point.position);
   }
 
   uint32_t cluster_ = 0, corner_count_ = 0;
   std::array<uint32_t, 2> guess_{};
-  uint32_t history_ = 0;             // bits: whether the last two corners were new points
-  std::array<uint32_t, 3> basis_{};  // points that the next new point is predicted from
-  std::array<uint32_t, 3> extent_{}; // per axis: bit width of the span of the last three basis points
+  PageTriangles triangles_;
+  PointOrder order_;
+  PositionPredictor predictor_;
 };
 
 } // namespace packtrace

@@ -19,13 +19,22 @@ namespace packtrace {
 inline constexpr uint32_t kProbabilityBits = 15;
 inline constexpr uint32_t kNibbleSymbols = 16;
 
-/// An adaptive distribution over 16 symbols. The cumulative frequencies move towards each coded symbol, at a rate that
-/// decreases with the number of symbols. No frequency ever reaches zero. Encoder and decoder keep equal copies.
-/// Source: Giesen, "Mixing discrete probability distributions", fgiesen.wordpress.com (2015).
-class NibbleModel {
+/// A distribution over 16 symbols. No frequency is 0.
+class NibbleTable {
 public:
-  NibbleModel() {
+  NibbleTable() {
     for (uint32_t i = 0; i <= kNibbleSymbols; ++i) below_[i] = static_cast<uint16_t>(i << (kProbabilityBits - 4));
+  }
+
+  /// The mean of two distributions; cumulative frequencies are rounded up.
+  NibbleTable(const NibbleTable& a, const NibbleTable& b) {
+#if defined(__SSE2__)
+    for (uint32_t i = 0; i < kNibbleSymbols; i += 8) store(i, _mm_avg_epu16(a.load(i), b.load(i)));
+#else
+    for (uint32_t i = 0; i < kNibbleSymbols; ++i)
+      below_[i] = static_cast<uint16_t>((uint32_t{a.below_[i]} + b.below_[i] + 1) / 2);
+#endif
+    below_[kNibbleSymbols] = uint16_t{1} << kProbabilityBits;
   }
 
   uint32_t below(uint32_t symbol) const { return below_[symbol]; }
@@ -46,6 +55,20 @@ public:
 #endif
   }
 
+protected:
+#if defined(__SSE2__)
+  __m128i load(uint32_t i) const { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(below_.data() + i)); }
+  void store(uint32_t i, __m128i values) { _mm_storeu_si128(reinterpret_cast<__m128i*>(below_.data() + i), values); }
+#endif
+
+  std::array<uint16_t, kNibbleSymbols + 1> below_;
+};
+
+/// An adaptive distribution over 16 symbols. The cumulative frequencies move towards each coded symbol, at a rate that
+/// decreases with the number of symbols. No frequency ever reaches zero. Encoder and decoder keep equal copies.
+/// Source: Giesen, "Mixing discrete probability distributions", fgiesen.wordpress.com (2015).
+class NibbleModel : public NibbleTable {
+public:
   void update(uint32_t symbol) {
     const int rate = kRates[count_];
     count_ = static_cast<uint16_t>(std::min<size_t>(count_ + size_t{1}, kRates.size() - 1));
@@ -54,8 +77,7 @@ public:
     const __m128i shift = _mm_cvtsi32_si128(rate);
     for (uint32_t i = 0; i < kNibbleSymbols; i += 8) {
       const __m128i old = load(i), aim = _mm_loadu_si128(reinterpret_cast<const __m128i*>(target + i));
-      _mm_storeu_si128(reinterpret_cast<__m128i*>(below_.data() + i),
-                       _mm_add_epi16(old, _mm_sra_epi16(_mm_sub_epi16(aim, old), shift)));
+      store(i, _mm_add_epi16(old, _mm_sra_epi16(_mm_sub_epi16(aim, old), shift)));
     }
 #else
     for (uint32_t i = 0; i < kNibbleSymbols; ++i)
@@ -64,10 +86,6 @@ public:
   }
 
 private:
-#if defined(__SSE2__)
-  __m128i load(uint32_t i) const { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(below_.data() + i)); }
-#endif
-
   using Targets = std::array<std::array<int16_t, kNibbleSymbols>, kNibbleSymbols>;
   /// Target cumulative frequencies per symbol: every other symbol has frequency 1. Consecutive values differ by at
   /// least 1, so that moving a fraction of the way keeps every frequency positive.
@@ -87,7 +105,6 @@ private:
     return rates;
   }();
 
-  std::array<uint16_t, kNibbleSymbols + 1> below_;
   uint16_t count_ = 0;
 };
 
@@ -106,12 +123,15 @@ public:
   }
 
   uint32_t symbol(NibbleModel& model) {
-    const uint32_t state = state_[0], slot = state & ((1u << kProbabilityBits) - 1);
-    const uint32_t symbol = model.find(slot);
-    uint32_t next = model.frequency(symbol) * (state >> kProbabilityBits) + slot - model.below(symbol);
-    if (next < kLowest) next = (next << 16) | next_word();
+    const uint32_t symbol = read(model);
     model.update(symbol);
-    state_ = {state_[1], next};
+    return symbol;
+  }
+
+  /// Uses the mean of two models.
+  uint32_t symbol(NibbleModel& first, NibbleModel& second) {
+    const uint32_t symbol = read(NibbleTable(first, second));
+    first.update(symbol), second.update(symbol);
     return symbol;
   }
 
@@ -121,6 +141,15 @@ public:
   static constexpr uint32_t kLowest = 1u << 16; ///< states are in [kLowest, 2^32)
 
 private:
+  uint32_t read(const NibbleTable& table) {
+    const uint32_t state = state_[0], slot = state & ((1u << kProbabilityBits) - 1);
+    const uint32_t symbol = table.find(slot);
+    uint32_t next = table.frequency(symbol) * (state >> kProbabilityBits) + slot - table.below(symbol);
+    if (next < kLowest) next = (next << 16) | next_word();
+    state_ = {state_[1], next};
+    return symbol;
+  }
+
   uint32_t next_word() {
     if (end_ - at_ < 2) {
       missing_ = true;

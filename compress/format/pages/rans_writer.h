@@ -18,10 +18,16 @@ public:
 
   /// Returns the symbol's cost in bits.
   double put(NibbleModel& model, uint32_t symbol) {
-    const uint32_t frequency = model.frequency(symbol);
-    steps_.push_back({static_cast<uint16_t>(model.below(symbol)), static_cast<uint16_t>(frequency)});
+    const double bits = add(model, symbol);
     model.update(symbol);
-    return kProbabilityBits - std::log2(frequency);
+    return bits;
+  }
+
+  /// Uses the mean of two models.
+  double put(NibbleModel& first, NibbleModel& second, uint32_t symbol) {
+    const double bits = add(NibbleTable(first, second), symbol);
+    first.update(symbol), second.update(symbol);
+    return bits;
   }
 
   std::vector<uint8_t> finish() const {
@@ -48,6 +54,12 @@ public:
   }
 
 private:
+  double add(const NibbleTable& table, uint32_t symbol) {
+    const uint32_t frequency = table.frequency(symbol);
+    steps_.push_back({static_cast<uint16_t>(table.below(symbol)), static_cast<uint16_t>(frequency)});
+    return kProbabilityBits - std::log2(frequency);
+  }
+
   struct Step {
     uint16_t below, frequency;
   };

@@ -49,7 +49,15 @@ class Values:
         self.models = {}
 
     def symbol(self, *name):
-        model = self.models.setdefault(name, Model())
+        return self.mixed_symbol(name)
+
+    def mixed_symbol(self, *names):
+        """Reads a symbol with the mean of the models of one or two names."""
+        models = [self.models.setdefault(name, Model()) for name in names]
+        model = models[0]
+        if len(models) == 2:
+            model = Model()
+            model.below = [(a + b + 1) // 2 for a, b in zip(*(one.below for one in models))]
         state = self.states.pop(0)
         slot = state & (1 << PROBABILITY_BITS) - 1
         symbol = model.find(slot)
@@ -57,7 +65,8 @@ class Values:
         if state < LOWEST:
             state = state << 16 | next(self.words)
         self.states.append(state)
-        model.update(symbol)
+        for one in models:
+            one.update(symbol)
         return symbol
 
     def flag(self, *name):
@@ -67,7 +76,10 @@ class Values:
         return self.fields.take(bits)
 
     def magnitude(self, *name):
-        width = self.symbol(*name)
+        return self.mixed_magnitude(name)
+
+    def mixed_magnitude(self, *names):
+        width = self.mixed_symbol(*names)
         if width == 0:
             return 0
         if width == WIDE:
@@ -78,6 +90,9 @@ class Values:
 
     def difference(self, *name):
         return unzigzag(self.magnitude(*name))
+
+    def mixed_difference(self, *names):
+        return unzigzag(self.mixed_magnitude(*names))
 
     def whole(self):
         return (next(self.words, None) is None and self.states == [LOWEST] * 2

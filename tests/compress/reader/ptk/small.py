@@ -5,21 +5,25 @@ from dataclasses import dataclass, field
 from ptk.canonical import pack
 from ptk.normal_guess import NormalPredictor, sum_of_face_normals
 from ptk.normals import NORMAL_ENCODINGS
+from ptk.place_guess import PlacePredictor
 from ptk.rans import Values
 from ptk.records import BadFile
 
 RIGHT, LEFT, RESTART = 0, 1, 2
 NEW, FIRST_GUESS, SECOND_GUESS, OF_CLUSTER, OF_PAGE, CREASE = range(6)
 FULL = 128
-MAX_SPAN = 19
+MOST_TRIANGLES = 7
 
 
 @dataclass
 class Point:
-    """A vertex position of the page with its border edges, newest first: outgoing ones as (end point, third corner of the
-    triangle), incoming ones as start points."""
+    """A vertex position of the page with its border edges, newest first: outgoing ones as (end point, corner that faces
+    the edge), incoming ones as start points."""
 
-    place: tuple
+    place: tuple = None
+    known: bool = False
+    widths: tuple = (0, 0, 0)  # bits of the errors of its place
+    triangles: int = 0  # so far, at most MOST_TRIANGLES
     outward: list = field(default_factory=list)
     inward: list = field(default_factory=list)
     cluster: int = -1  # last cluster with a vertex here
@@ -67,18 +71,21 @@ class PageDecoder:
     def __init__(self, page):
         self.values = Values(page)
         self.points = []
+        self.corner_points = []  # of all triangles of the page
+        self.across = []  # per corner, the one that faces the same edge from the other side
         self.number = 0
         self.last = SmallCluster()
-        self.recent_new = (0, 0)  # whether the last two corners were new points
-        self.spans = [MAX_SPAN] * 3
+        self.place_predictor = PlacePredictor()
         self.predictor = NormalPredictor()
 
     def cluster(self, encoding):
         self.encoding = encoding
         self.c = SmallCluster()
         self.vertices = []
+        first_point, first_corner = len(self.points), len(self.corner_points)
         self.header()
         self.triangles()
+        self.places(first_point, first_corner)
         self.c.places = [self.points[vertex.point].place for vertex in self.vertices]
         if self.c.has_normals:
             self.normals()
@@ -102,56 +109,54 @@ class PageDecoder:
     def triangles(self):
         c = self.c
         t, before = (), 0  # corners as vertices; the point of the last corner
-        recent = RESTART, RESTART
         for i in range(c.triangle_count):
             turn = RESTART
             if i > 0:
                 a, b, last = (self.vertices[v].point for v in t)
                 open_right, open_left = last in self.points[b].ends(), a in self.points[last].ends()
-                turn = min(self.values.symbol("turn", c.has_normals, recent, open_right, open_left), RESTART)
+                counts = self.points[a].triangles, self.points[b].triangles
+                turn = min(self.values.symbol("turn", counts, open_right, open_left), RESTART)
             c.turns.append(turn)
-            recent = recent[1], turn
             if turn == RESTART:
                 t = self.first_triangle(before)
             else:
                 p, q, o = (t[0], t[2], t[1]) if turn == LEFT else (t[2], t[1], t[0])
-                model = "strip", self.recent_new, turn == c.turns[-2]
-                t = p, q, self.third(p, q, self.vertices[o].point, self.vertices[o].point, model)
+                counts = [self.points[self.vertices[v].point].triangles for v in (p, q)]
+                model = "strip", min(max(counts[0], 3), 6), counts[1]
+                t = p, q, self.third(p, q, self.vertices[o].point, model)
             before = self.vertices[t[2]].point
             c.triangles.append(t)
-            self.close_edges([self.vertices[v].point for v in t])
+            self.add_triangle([self.vertices[v].point for v in t])
 
     def first_triangle(self, before):
-        guesses, basis = (None, None), ()
-        if self.points:
-            guesses, basis = self.ends_at(before), (before,)
-        a = self.corner(guesses, basis, (), ("first", 0), 1)
+        guesses = self.ends_at(before) if self.points else (None, None)
+        a = self.corner(guesses, None, (), ("first", 0), 1)
         p = self.vertices[a].point
-        b = self.corner(self.ends_at(p), (p,), (a,), ("first", 1), 2)
+        b = self.corner(self.ends_at(p), None, (a,), ("first", 1), 2)
         q = self.vertices[b].point
-        apex = next((third for end, third in self.points[q].outward if end == p), None)
-        return a, b, self.third(a, b, apex, p if apex is None else apex, ("first", 2), kind=3)
+        apex = next((self.corner_points[facing] for end, facing in self.points[q].outward if end == p), None)
+        return a, b, self.third(a, b, apex, ("first", 2), kind=3)
 
     def ends_at(self, point):
         """Returns the start of the newest border edge into the point and the end of the newest one out of it."""
         return first_but(self.points[point].inward, None), first_but(self.points[point].ends(), None)
 
-    def third(self, a, b, opposite, origin, model, kind=0):
+    def third(self, a, b, opposite, model, kind=0):
         p, q = self.vertices[a].point, self.vertices[b].point
         guesses = first_but(self.points[q].inward, opposite), first_but(self.points[p].ends(), opposite)
-        return self.corner(guesses, (p, q, origin), (a, b), model, kind)
+        return self.corner(guesses, opposite, (a, b), model, kind)
 
-    def corner(self, guesses, basis, before, model, kind):
+    def corner(self, guesses, opposite, before, model, kind):
         """Decodes a corner and returns its vertex."""
         values = self.values
         state = tuple(self.state_of(guess) for guess in guesses)
         if guesses[0] == guesses[1]:
             state = state[0], "same"
         naming = values.symbol(*model, state)
-        self.recent_new = self.recent_new[1], int(naming == NEW)
         fresh = True
         if naming == NEW:
-            point = self.new_point(basis)
+            point = len(self.points)
+            self.points.append(Point())
         elif naming in (FIRST_GUESS, SECOND_GUESS):
             point = guesses[naming - FIRST_GUESS]
             if self.points[point].cluster == self.number:
@@ -170,7 +175,6 @@ class PageDecoder:
             raise BadFile("a corner without a name")
         if fresh:
             vertex = len(self.vertices)
-            opposite = basis[2] if len(basis) == 3 and basis[2] != basis[0] else None
             self.vertices.append(Vertex(point, before, opposite))
             self.points[point].cluster, self.points[point].vertex = self.number, vertex
         self.c.corners.append((vertex, fresh))
@@ -181,32 +185,56 @@ class PageDecoder:
             return "none"
         return "here" if self.points[guess].cluster == self.number else "elsewhere"
 
-    def new_point(self, basis):
-        guess = (0, 0, 0)
-        if len(basis) == 1:
-            guess = self.points[basis[0]].place
-        if len(basis) == 3:
-            columns = list(zip(*(self.points[i].place for i in basis)))
-            guess = [p + q - o for p, q, o in columns]
-            self.spans = [min((max(column) - min(column)).bit_length(), MAX_SPAN) for column in columns]
-        place, surprise = [], 0
-        for g, span in zip(guess, self.spans):
-            off = self.values.difference("position", span, surprise)
-            place.append(g + off)
-            width = (~off if off < 0 else off).bit_length()
-            surprise = 0 if width == 0 else 1 if width + 2 < span else 2
-        self.points.append(Point(tuple(place)))
-        return len(self.points) - 1
-
-    def close_edges(self, t):
-        for begin, end, third in ((t[0], t[1], t[2]), (t[1], t[2], t[0]), (t[2], t[0], t[1])):
+    def add_triangle(self, t):
+        first = len(self.corner_points)
+        self.corner_points += t
+        self.across += [None] * 3
+        for i in range(3):
+            begin, end, facing = t[i], t[(i + 1) % 3], first + (i + 2) % 3
             a, b = self.points[begin], self.points[end]
+            a.triangles = min(a.triangles + 1, MOST_TRIANGLES)
             if end in a.inward and begin in b.ends():
                 a.inward.remove(end)
-                del b.outward[b.ends().index(begin)]
+                _, other = b.outward.pop(b.ends().index(begin))
+                self.across[facing], self.across[other] = other, facing
             else:
-                a.outward = [(end, third)] + a.outward[:1]
+                a.outward = [(end, facing)] + a.outward[:1]
                 b.inward = [begin] + b.inward[:1]
+
+    def surroundings(self, corner):
+        """Returns the next and the previous point of a corner's triangle, and the point across their edge or None."""
+        first = corner - corner % 3
+        across = self.across[corner]
+        following, before = (self.corner_points[first + (corner + i) % 3] for i in (1, 2))
+        return following, before, None if across is None else self.corner_points[across]
+
+    def rank(self, corners):
+        rank = 0
+        for p, q, across in corners:
+            known = self.points[p].known + self.points[q].known
+            enclosed = known == 2 and across is not None and self.points[across].known
+            rank += 256 if enclosed else (0, 1, 16)[known]
+        return rank
+
+    def places(self, first_point, first_corner):
+        around = {point: [] for point in range(first_point, len(self.points))}
+        for corner in range(first_corner, len(self.corner_points)):
+            if self.corner_points[corner] >= first_point:
+                around[self.corner_points[corner]].append(self.surroundings(corner))
+        while around:
+            number = max(around, key=lambda point: (self.rank(around[point]), -point))
+            self.place(self.points[number], around.pop(number))
+
+    def place(self, point, corners):
+        guess = self.place_predictor.predict(self.points, corners)
+        errors = []
+        for axis in range(3):
+            errors.append(self.values.mixed_difference(*self.place_predictor.models(axis)))
+            self.place_predictor.learn_error(errors[-1])
+        point.place = tuple(g + error for g, error in zip(guess, errors))
+        point.widths = tuple((~error if error < 0 else error).bit_length() for error in errors)
+        point.known = True
+        self.place_predictor.learn_place(point.place)
 
     def normals(self):
         c = self.c
