@@ -27,20 +27,25 @@ struct BorderEnds {
   uint32_t pick(uint32_t other_than) const { return points[0] != other_than ? points[0] : points[1]; }
 };
 
-/// A distinct vertex position of a page, and the border of the triangles coded so far there.
-struct PagePoint {
+/// A distinct vertex position of a page, and the border of the triangles coded so far there. A cache line.
+struct alignas(64) PagePoint {
   LatticePoint position{};
   BorderEnds next;                     ///< end points of border edges that begin here, newest first
   BorderEnds previous;                 ///< start points of border edges that end here, newest first
   BorderEnds apex;                     ///< corners that face the edges to `next`
   uint32_t cluster = 0;                ///< last cluster with a vertex here
   uint16_t vertex = 0;                 ///< newest vertex of that cluster here
-  uint16_t normal_count = 0;           ///< 0..2
   bool known = false;                  ///< whether the position has been coded
   uint8_t triangles = 0;               ///< triangles here so far, at most kMaxCountedTriangles
   std::array<uint8_t, 3> error_bits{}; ///< bit widths of the position's coded errors
-  std::array<NormalFields, 2> normals; ///< the last two different normals, newest first
-  Vec3 unit_normal{0.0f};              ///< the newest, decoded
+};
+static_assert(sizeof(PagePoint) == 64);
+
+/// The normals at a point.
+struct PagePointNormals {
+  uint32_t count = 0;                 ///< 0..2
+  std::array<NormalFields, 2> last{}; ///< the last two different normals, newest first
+  Vec3 unit_normal{0.0f};             ///< the newest, decoded
 };
 inline constexpr uint8_t kMaxCountedTriangles = 7;
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "compress/format/pages/normal_predictor.h"
 #include "compress/format/pages/page_cluster.h"
@@ -33,6 +34,7 @@ public:
     this->begin_surface();
     last_ = {};
     normals_.begin();
+    normals_at_.clear();
   }
 
   /// Codes one cluster.
@@ -74,9 +76,10 @@ private:
   void code_normals() {
     ClusterValues& c = *values_;
     sum_face_normals();
+    normals_at_.resize(points_.size());
     uint32_t last = 0;
     for (uint32_t v = 0; v < vertex_count_; ++v) {
-      PagePoint& point = points_[vertices_[v].point];
+      PagePointNormals& point = normals_at_[vertices_[v].point];
       std::array<const NormalFields*, 4> candidates{};
       uint32_t count = 0, known = 0;
       const auto offer = [&](const NormalFields& fields) {
@@ -84,7 +87,7 @@ private:
           if (*candidates[i] == fields) return;
         candidates[count++] = &fields;
       };
-      for (uint32_t i = 0; i < point.normal_count; ++i) offer(point.normals[i]);
+      for (uint32_t i = 0; i < point.count; ++i) offer(point.last[i]);
       known = count;
       for (const uint16_t n : vertices_[v].neighbours)
         if (n != kNoVertex) offer(c.normals[n]);
@@ -105,10 +108,10 @@ private:
       vertices_[v].unit_normal = decode_normal(encoding_, c.normals[v]);
       if (choice == 0) normals_.learn(DVec3(vertices_[v].unit_normal));
       if (choice == 0 || choice > known || choice == 2) {
-        point.normals[1] = point.normals[0];
-        point.normals[0] = c.normals[v];
+        point.last[1] = point.last[0];
+        point.last[0] = c.normals[v];
         point.unit_normal = vertices_[v].unit_normal;
-        point.normal_count = static_cast<uint16_t>(std::min(point.normal_count + 1, 2));
+        point.count = std::min(point.count + 1, 2u);
       }
     }
   }
@@ -140,9 +143,9 @@ private:
       s.neighbours[s.neighbour_count] = DVec3(vertices_[n].unit_normal);
       s.edges[s.neighbour_count++] = steps_between(values_->positions[n], values_->positions[v]);
     }
-    if (s.neighbour_count == 2 && vertex.opposite != kNone && points_[vertex.opposite].normal_count > 0) {
+    if (s.neighbour_count == 2 && vertex.opposite != kNone && normals_at_[vertex.opposite].count > 0) {
       s.has_opposite = true;
-      s.opposite = DVec3(points_[vertex.opposite].unit_normal);
+      s.opposite = DVec3(normals_at_[vertex.opposite].unit_normal);
     }
     return s;
   }
@@ -182,6 +185,7 @@ private:
     bool has_normals = false, has_uvs = false;
   } last_;
   NormalPredictor normals_;
+  std::vector<PagePointNormals> normals_at_; // per point; shorter than points_ after clusters without normals
 };
 
 } // namespace packtrace

@@ -27,6 +27,9 @@ int64_t round_steps(double x) {
   return whole - (static_cast<double>(whole) > shifted ? 1 : 0);
 }
 
+/// Class of an expected square error.
+uint32_t level(int32_t log) { return static_cast<uint32_t>(std::clamp((log >> 10) + 4, 0, 39)); }
+
 /// Bit width of a length in steps, at most `most`.
 uint32_t width_of(double length, uint32_t most) {
   return std::min(static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(std::min(length, 0x1p40)))), most);
@@ -127,6 +130,9 @@ void PositionPredictor::mix_guesses() {
     sum += guesses_[i].place * weight;
   }
   set_prediction(sum / weights);
+  const double squares = dot(span_, span_);
+  least_share_ = squares * 0x1p-6;
+  log_square_span_ = log2_fixed(squares + 1.0);
   for (size_t i = 0; i < guess_count_; ++i)
     for (int axis = 0; axis < 3; ++axis)
       spread_[axis] = std::max(spread_[axis], std::abs(guesses_[i].place[axis] - place_[axis]));
@@ -184,9 +190,7 @@ PositionPredictor::Models PositionPredictor::models(size_t axis) {
     const uint32_t kind = known_count_ > 0 ? 1 : 0;
     return {context::kPositionAlone + (kind * (kWidest + 1) + span_bits_) * 3 + span_surprise_, 0, false};
   }
-  const auto level = [](int32_t log) { return static_cast<uint32_t>(std::clamp((log + 4 * kOne) / kOne, 0, 39)); };
-  const double squares = dot(span_, span_);
-  const int32_t share = log2_fixed(span * span + squares * 0x1p-6) - log2_fixed(squares + 1.0);
+  const int32_t share = log2_fixed(span * span + least_share_) - log_square_span_;
   const uint32_t near = near_errors_[axis], along = level(least_expected_ + share);
   const uint32_t spread = guess_count_ > 1 ? width_of(2.0 * spread_[static_cast<int>(axis)], kWidest) : span_bits_;
   features_ = {static_cast<uint32_t>(std::min<size_t>(guess_count_, 3) * 3 + axis),

@@ -88,6 +88,8 @@ private:
   std::array<Guess, kMaxGuesses> guesses_{};
   size_t guess_count_ = 0;
   int32_t least_expected_ = 0;
+  double least_share_ = 0.0;    ///< of an axis in the square of the span
+  int32_t log_square_span_ = 0; ///< see log2_fixed()
 
   std::array<int32_t, kClasses> errors_{}; ///< mean of log(square error / size), see log2_fixed()
   std::array<uint8_t, kClasses> counts_{};
