@@ -1,6 +1,7 @@
 #include "compress/format/pages/position_predictor.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -136,29 +137,112 @@ TEST(PositionPredictor, GuessesOfAClassThatFailsLoseWeight) {
   EXPECT_GT(before, 2 * distance());
 }
 
-TEST(PositionPredictor, ModelsStayInRangeForAnyPositions) {
-  Grid grid(3, Grid::kSide + 1);
-  const uint32_t point = grid.number(Grid::kSide + 1);
-  const PointOrder order = grid.order(point);
-  const int64_t largest = std::numeric_limits<int64_t>::max(), least = std::numeric_limits<int64_t>::min();
-  for (uint32_t i = 0; i < point; ++i) {
-    grid.points[i].position = {i % 2 != 0 ? largest : least, i % 3 != 0 ? largest : 0, i % 5 != 0 ? least : 1};
-    grid.points[i].error_bits = {64, 64, 64};
+constexpr int64_t kLargest = std::numeric_limits<int64_t>::max(), kLeast = std::numeric_limits<int64_t>::min();
+
+/// Points of a grid at the ends of 64 bits, all known but those that the test adds to its triangles.
+struct ExtremeGrid : Grid {
+  ExtremeGrid() : Grid(3, kSide + 1) {
+    for (uint32_t i = 0; i < points.size(); ++i) {
+      points[i].position = {i % 2 != 0 ? kLargest : kLeast, i % 3 != 0 ? kLargest : 0, i % 5 != 0 ? kLeast : 1};
+      points[i].error_bits = {64, 64, 64};
+    }
   }
+};
+
+/// Predicts a point many times, with errors and positions at the ends of 64 bits, and checks the models' numbers.
+void expect_models_in_range(const Grid& grid, const PointOrder& order, uint32_t point, bool mixed) {
   PositionPredictor predictor;
   predictor.begin();
   for (int i = 0; i < 2000; ++i) {
     predictor.predict(grid.points, grid.triangles, order, point);
     for (size_t axis = 0; axis < 3; ++axis) {
       const auto models = predictor.models(axis);
-      EXPECT_GE(models.first, context::kPosition);
-      EXPECT_LT(models.first, context::kNormalChoice);
-      EXPECT_TRUE(!models.mixed ||
-                  (models.second >= context::kPositionNear && models.second < context::kPositionAlone));
-      predictor.learn_error(i % 2 != 0 ? largest : least);
+      ASSERT_EQ(models.mixed, mixed);
+      ASSERT_GE(models.first, mixed ? context::kPosition : context::kPositionAlone);
+      ASSERT_LT(models.first, mixed ? context::kPositionNear : context::kNormalChoice);
+      ASSERT_TRUE(!mixed || (models.second >= context::kPositionNear && models.second < context::kPositionAlone));
+      predictor.learn_error(i % 2 != 0 ? kLargest : kLeast);
     }
-    predictor.learn_position({i % 3 != 0 ? largest : least, 0, least});
+    predictor.learn_position({i % 3 != 0 ? kLargest : kLeast, 0, kLeast});
   }
+}
+
+TEST(PositionPredictor, ModelsStayInRangeForAnyPositions) {
+  ExtremeGrid grid;
+  const uint32_t point = grid.number(Grid::kSide + 1);
+  expect_models_in_range(grid, grid.order(point), point, true);
+}
+
+TEST(PositionPredictor, ModelsStayInRangeForPointsWithoutGuess) {
+  for (const uint32_t neighbours : {2u, 1u, 0u}) { // known ones in the only triangle
+    ExtremeGrid grid;
+    const auto first = static_cast<uint32_t>(grid.points.size()), corner = grid.triangles.count();
+    for (PagePoint& point : grid.points) point.known = true;
+    grid.points.resize(first + 3);
+    add_triangle(grid.points, grid.triangles, {neighbours > 0 ? 0 : first + 1, neighbours > 1 ? 2 : first + 2, first});
+    PointOrder order;
+    order.begin(grid.triangles, first + 3, first, corner);
+    expect_models_in_range(grid, order, first, false);
+  }
+}
+
+/// Triangles that hostile files may hold: around one point, with points more than once.
+TEST(PointOrder, FansAndDegenerateTrianglesGiveEveryPointOnce) {
+  std::vector<PagePoint> points(kMaxClusterVertices + 2);
+  PageTriangles triangles;
+  add_triangle(points, triangles, {0, 1, 0}); // of an earlier cluster
+  const uint32_t first_corner = triangles.count();
+  for (uint32_t i = 0; i < kMaxClusterTriangles; ++i) {
+    const uint32_t a = 2 + 2 * i, b = a + 1;
+    if (i % 4 == 3)
+      add_triangle(points, triangles, {b, a, a});
+    else
+      add_triangle(points, triangles, {a, i % 4 == 2 ? a : i % 2, b});
+  }
+  points[0].known = points[1].known = true;
+  PointOrder order;
+  order.begin(triangles, static_cast<uint32_t>(points.size()), 2, first_corner);
+  ASSERT_EQ(order.count(), kMaxClusterVertices);
+  PositionPredictor predictor;
+  predictor.begin();
+  for (uint32_t i = 0; i < order.count(); ++i) {
+    const uint32_t point = order.next();
+    ASSERT_GE(point, 2u);
+    ASSERT_LT(point, points.size());
+    ASSERT_FALSE(points[point].known);
+    predictor.predict(points, triangles, order, point);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      (void)predictor.models(axis);
+      predictor.learn_error(1);
+    }
+    points[point].known = true;
+    order.learn(point);
+  }
+}
+
+/// More corners and guesses around a point than are used: the prediction stays that of the plane.
+TEST(PositionPredictor, UsesSomeOfManyCorners) {
+  constexpr uint32_t kRim = 20;
+  std::vector<PagePoint> points(2 * kRim + 1);
+  PageTriangles triangles;
+  for (uint32_t i = 0; i < kRim; ++i) {
+    const auto angle = static_cast<double>(i) * 6.283185307179586 / kRim;
+    const LatticePoint near{std::lround(1000 * std::cos(angle)), std::lround(1000 * std::sin(angle)), 40};
+    points[i].position = near;
+    points[kRim + i].position = {2 * near[0], 2 * near[1], 40};
+    points[i].known = points[kRim + i].known = true;
+    const uint32_t next = (i + 1) % kRim;
+    add_triangle(points, triangles, {i, kRim + i, next});
+  }
+  const uint32_t corner = triangles.count(), middle = 2 * kRim;
+  for (uint32_t i = 0; i < kRim; ++i) add_triangle(points, triangles, {middle, i, (i + 1) % kRim});
+  PointOrder order;
+  order.begin(triangles, middle + 1, middle, corner);
+  ASSERT_EQ(order.corner_count(middle), kRim);
+  PositionPredictor predictor;
+  predictor.begin();
+  predictor.predict(points, triangles, order, middle);
+  EXPECT_EQ(predictor.coordinate(2), 40);
 }
 
 } // namespace

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/pages/fixed_log.h"
 #include "compress/format/pages/page_normals.h"
 
 namespace packtrace {
@@ -109,7 +110,7 @@ private:
   int32_t log_error(DVec3 normal, DVec3 guess) const {
     const DVec3 error = (normal - guess) * steps_;
     const double square = glm::dot(error, error) * 256.0 + 1.0;
-    return static_cast<int32_t>((std::bit_cast<uint64_t>(square) >> 42) - (uint64_t{1023} << 10));
+    return log2_fixed(square);
   }
 
   /// About 2^(-2 e / 1024), thus the inverse fourth power of the error: near a crease the better guess wins.

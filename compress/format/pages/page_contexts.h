@@ -25,7 +25,7 @@ inline constexpr uint32_t kBack = kVertexAtPointBack + 1; // 4 kinds of corners
 inline constexpr uint32_t kPageBack = kBack + 4;
 inline constexpr uint32_t kWidths = 46;
 inline constexpr uint32_t kPosition = kPageBack + 1;           // expected width, in halves
-inline constexpr uint32_t kPositionNear = kPosition + kWidths; // 24 widths of errors near by x 16 expected errors
+inline constexpr uint32_t kPositionNear = kPosition + kWidths; // 24 widths of nearby errors x 16 expected errors
 // without guess: 2 kinds of surroundings x 20 spans x 3 levels of surprise
 inline constexpr uint32_t kPositionAlone = kPositionNear + 384;
 // 3 kinds of the last vertex x 3 counts of known x 3 of other candidates

@@ -20,6 +20,7 @@ namespace packtrace {
 /// A Coder has:
 ///   static constexpr bool kDecodes;
 ///   uint32_t symbol(uint32_t context, uint32_t value);              values 0..15
+///   uint32_t symbol(uint32_t first, uint32_t second, uint32_t value);   with the mean of two models
 ///   uint64_t raw(uint32_t context, uint64_t value, uint32_t bits);  0..32 bits; the context only assigns a stream
 ///   uint32_t find_point(const LatticePoint&);                       encoders: the page's point there, or kNoPoint
 ///   void add_point(const LatticePoint&, uint32_t point);            encoders

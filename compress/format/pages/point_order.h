@@ -59,6 +59,7 @@ public:
   uint32_t next() const {
     int32_t best = 0;
     for (uint32_t i = 0; i < count_; ++i) best = std::max(best, keys_[i]);
+    // The remainder is kMaxClusterVertices - 1 - i.
     return first_point_ + kMaxClusterVertices - 1 - (static_cast<uint32_t>(best) - 1) % kMaxClusterVertices;
   }
 
@@ -109,8 +110,10 @@ private:
 
   uint32_t first_corner_ = 0, first_point_ = 0, count_ = 0;
   std::array<uint16_t, kMaxClusterVertices + 1> begins_{}, ends_{}; // of a new point's corners in corners_
-  std::array<int32_t, kMaxClusterVertices + 1> keys_{};             // ranks, then points in order
-  std::array<uint16_t, kMaxCorners> points_{}, across_{};           // per corner of the cluster
+  /// kMaxClusterVertices x rank + kMaxClusterVertices - i for new point i, so the largest key is that of the next
+  /// point.
+  std::array<int32_t, kMaxClusterVertices + 1> keys_{};
+  std::array<uint16_t, kMaxCorners> points_{}, across_{}; // per corner of the cluster
   std::array<uint8_t, kMaxCorners> states_{};
   std::array<uint16_t, kMaxCorners> corners_{}; // by new point
 };

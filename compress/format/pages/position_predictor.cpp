@@ -4,20 +4,15 @@
 #include <bit>
 #include <cmath>
 
+#include "compress/format/pages/fixed_log.h"
+
 namespace packtrace {
 namespace {
 
-constexpr int32_t kOne = 1 << 10; // of log2_fixed()
-
-/// Binary logarithm times 1024, linear between powers of two. Of 0: -1023 * 1024.
-int32_t log2_fixed(double x) { return static_cast<int32_t>(std::bit_cast<uint64_t>(x) >> 42) - 1023 * kOne; }
-
 /// 2^(x / 1024), linear between powers of two; the inverse of log2_fixed().
 double exp2_linear(int32_t x) {
-  return std::bit_cast<double>(static_cast<uint64_t>(std::clamp(x + 1023 * kOne, kOne, 2046 * kOne)) << 42);
+  return std::bit_cast<double>(static_cast<uint64_t>(std::clamp(x + 1023 * kLogOne, kLogOne, 2046 * kLogOne)) << 42);
 }
-
-double dot(const DVec3& a, const DVec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 /// Rounds to the nearest integer, up in the middle. Very large values become 0.
 int64_t round_steps(double x) {
@@ -49,7 +44,7 @@ constexpr std::array<int32_t, 7> kFirstSlopes{0, 100, 40, 20, 0, 0, 0};
 void PositionPredictor::begin() {
   last_ = {};
   last_span_ = DVec3(0x1p18);
-  errors_.fill(-3 * kOne);
+  errors_.fill(-3 * kLogOne);
   counts_.fill(0);
   for (size_t f = 0; f < kFeatures; ++f)
     for (size_t i = 0; i < kTerms; ++i) terms_[f][i] = static_cast<int32_t>(i) * kFirstSlopes[f];
@@ -94,7 +89,7 @@ void PositionPredictor::add_guess(const DVec3& p, const DVec3& q, const DVec3& o
   const DVec3 u = p - o, v = q - o, w = q - p;
   for (int axis = 0; axis < 3; ++axis)
     span_[axis] = std::max(std::max(span_[axis], std::abs(u[axis])), std::max(std::abs(v[axis]), std::abs(w[axis])));
-  const double uu = dot(u, u), vv = dot(v, v), uv = dot(u, v);
+  const double uu = glm::dot(u, u), vv = glm::dot(v, v), uv = glm::dot(u, v);
   const double cosine = uv * std::abs(uv), scale = uu * vv;
   uint32_t angle = 0;
   for (const double limit : between_edges ? kBetweenLimits : kAcrossLimits) angle += cosine >= limit * scale ? 1 : 0;
@@ -107,12 +102,13 @@ void PositionPredictor::classify_by_agreement() {
   for (size_t i = 0; i < guess_count_; ++i)
     for (size_t j = i + 1; j < guess_count_; ++j) {
       const DVec3 apart = guesses_[i].place - guesses_[j].place;
-      const double square = dot(apart, apart);
+      const double square = glm::dot(apart, apart);
       nearest[i] = std::min(nearest[i], square), nearest[j] = std::min(nearest[j], square);
     }
   for (size_t i = 0; i < guess_count_; ++i) {
     const int32_t apart = log2_fixed(nearest[i] + 0.5) - guesses_[i].log_size;
-    const int32_t agreement = std::clamp((apart + 14 * kOne) / (3 * kOne), 0, static_cast<int32_t>(kAgreements) - 2);
+    const int32_t agreement =
+        std::clamp((apart + 14 * kLogOne) / (3 * kLogOne), 0, static_cast<int32_t>(kAgreements) - 2);
     guesses_[i].cls += 2 * kAngles * (1 + static_cast<uint32_t>(agreement));
   }
 }
@@ -130,7 +126,7 @@ void PositionPredictor::mix_guesses() {
     sum += guesses_[i].place * weight;
   }
   set_prediction(sum / weights);
-  const double squares = dot(span_, span_);
+  const double squares = glm::dot(span_, span_);
   least_share_ = squares * 0x1p-6;
   log_square_span_ = log2_fixed(squares + 1.0);
   for (size_t i = 0; i < guess_count_; ++i)
@@ -226,7 +222,7 @@ void PositionPredictor::learn_position(const LatticePoint& position) {
   const DVec3 place = steps_between(origin_, position);
   for (size_t i = 0; i < guess_count_; ++i) {
     const DVec3 off = guesses_[i].place - place;
-    const int32_t error = log2_fixed(dot(off, off) + 0.5) - guesses_[i].log_size;
+    const int32_t error = log2_fixed(glm::dot(off, off) + 0.5) - guesses_[i].log_size;
     int32_t& mean = errors_[guesses_[i].cls];
     uint8_t& count = counts_[guesses_[i].cls];
     mean += (error - mean) >> std::min(static_cast<int>(std::bit_width(count + 1u)), 5);

@@ -14,9 +14,9 @@ namespace packtrace {
 ///
 /// Around a point lie parallelograms: over the edge that faces it, and over two edges that meet beside it. Each gives a
 /// guess. The prediction is their mean, weighted by the recent errors of guesses of the same class: of the same kind,
-/// with a similar angle, and as close to the nearest other guess. So a diagonal of a quad wins over its sides, and at
-/// creases guesses that agree win. The width of each coordinate's error is estimated as a sum of learned terms, one per
-/// feature of the surroundings.
+/// with a similar angle, and as close to the nearest other guess. So classes that were right more often count more:
+/// inside a quad the guess over its diagonal, at a crease the guesses that agree. The width of each coordinate's error
+/// is estimated as a sum of learned terms, one per feature of the surroundings.
 ///
 /// The results are the same on every machine: only +, -, x and / of doubles and integer arithmetic are used.
 /// Sources: Touma and Gotsman, "Triangle mesh compression" (1998); Cohen-Or, Cohen and Irony, "Multi-way geometry

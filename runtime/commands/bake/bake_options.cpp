@@ -219,7 +219,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
   verb.add_option(
           "--codec", options.codec,
           "Compression on disk. none is memory-mapped and traced as it is; fast and small are decoded into memory when "
-          "the file is opened. small gives the smallest file; fast opens four to five times as fast as small (default "
+          "the file is opened. small gives the smallest file; fast opens more than ten times as fast as small (default "
           "none)")
       ->check(one_of({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                       std::string(name_of(PageCodec::kSmall))}))
