@@ -68,6 +68,23 @@ inline std::vector<Ray> random_rays(size_t count, const Bounds& world, const Uni
   return rays;
 }
 
+/// Rays from one origin in a cone, ordered by blocks of neighbours as camera rays are. Some have a limited range of t.
+inline std::vector<Ray> cone(const UnitSpace& space, const DVec3& from, const DVec3& towards, double width) {
+  std::vector<Ray> rays;
+  for (int i = 0; i < 64 * 64; ++i) {
+    const int block = i / 16, within = i % 16;
+    const double x = (block % 16 * 4 + within % 4 - 32) * width / 32,
+                 y = (block / 16 * 4 + within / 4 - 32) * width / 32;
+    Ray ray;
+    ray.origin = Vec3(space.to_unit(from));
+    ray.direction = Vec3(towards + DVec3(x, y, -0.5 * x));
+    if (i % 7 == 0) ray.tnear = static_cast<float>(space.scale() * 4.0);
+    if (i % 5 == 0) ray.tfar = static_cast<float>(space.scale() * 9.0);
+    rays.push_back(ray);
+  }
+  return rays;
+}
+
 /// World shapes and instances: rotated, mirrored, squeezed and far apart. One shape is masked, one does not occlude and
 /// one is invisible.
 inline Scene varied_scene() {

@@ -19,6 +19,7 @@ using test::add_shape;
 using test::any;
 using test::BakedScene;
 using test::closest;
+using test::cone;
 using test::isas;
 using test::placed;
 using test::quad;
@@ -80,23 +81,6 @@ TEST(PackedTracer, FindsTheSameWithAllInstructionSets) {
   }
 }
 
-/// Rays from one origin in a cone, ordered by blocks of neighbours as camera rays are. Some have a limited range of t.
-std::vector<Ray> cone(const UnitSpace& space, const DVec3& from, const DVec3& towards, double width) {
-  std::vector<Ray> rays;
-  for (int i = 0; i < 64 * 64; ++i) {
-    const int block = i / 16, within = i % 16;
-    const double x = (block % 16 * 4 + within % 4 - 32) * width / 32,
-                 y = (block / 16 * 4 + within / 4 - 32) * width / 32;
-    Ray ray;
-    ray.origin = Vec3(space.to_unit(from));
-    ray.direction = Vec3(towards + DVec3(x, y, -0.5 * x));
-    if (i % 7 == 0) ray.tnear = static_cast<float>(space.scale() * 4.0);
-    if (i % 5 == 0) ray.tfar = static_cast<float>(space.scale() * 9.0);
-    rays.push_back(ray);
-  }
-  return rays;
-}
-
 TEST(PackedTracer, BeamsFindWhatTheirRaysFind) {
   const BakedScene baked(varied_scene());
   for (const PackedIsa isa : isas()) {
@@ -117,46 +101,6 @@ TEST(PackedTracer, BeamsFindWhatTheirRaysFind) {
           }
         }
     EXPECT_GT(hits, test::sanitized() ? 10000u / 13 : 30000u);
-  }
-}
-
-/// Expects that the rays of a cone find together, bit for bit, what each finds alone. Returns the number of hits.
-size_t trace_cone(const PackedTracer& tracer, const DVec3& from, const DVec3& towards, double width) {
-  const std::vector<Ray> rays = cone(tracer.space(), from, towards, width);
-  const std::vector<RayHit> together = closest(tracer, rays);
-  size_t hits = 0, different = 0;
-  for (size_t i = 0; i < rays.size(); i += test::sanitized() ? 13 : 1) {
-    RayHit alone;
-    tracer.closest_hits({&rays[i], 1}, kCameraRays, RayOrder::kCoherent, {&alone, 1});
-    different += std::memcmp(&together[i], &alone, sizeof alone) != 0;
-    hits += alone.valid();
-  }
-  EXPECT_EQ(different, 0u) << tracer.isa();
-  return hits;
-}
-
-/// Runs of camera rays are culled by bounds of all directions before they are transformed, and coincident instances
-/// have hits of equal t, of which the first counts.
-TEST(PackedTracer, RunsBesideOneBodyAndThroughCoincidentOnesFindWhatTheirRaysFind) {
-  Scene one, coincident;
-  add_shape(one, sphere({0, 1, 0}, 1, 24));
-  const uint32_t ball = add_object(coincident, sphere({0, 0, 0}, 1, 24));
-  for (const double turn : {0.0, 0.0, 30.0})
-    coincident.instances.push_back({ball, Affine(placed({0, 1, 0}, DVec3(1.0), turn))});
-  coincident.instances.push_back({ball, Affine(placed({4, 1, 0}, DVec3(1.0, -0.5, 2.0), 77.0))});
-  for (const Scene* const scene : {&one, &coincident}) {
-    const BakedScene baked(*scene);
-    for (const PackedIsa isa : isas()) {
-      const PackedTracer tracer(baked.file, baked.source, isa);
-      size_t hits = 0, rays = 0;
-      for (const DVec3& from : {DVec3(0, 1, 0), DVec3(0.3, 1.2, -5), DVec3(-900, 1.5, 0.1), DVec3(1.001, 1, 0)})
-        for (const DVec3& towards : {DVec3(0.01, 0, 1), DVec3(1, -0.0002, -0.0001), DVec3(-0.6, -0.2, -0.7)})
-          for (const double width : {0.001, 0.1, 1.0})
-            hits += trace_cone(tracer, from, towards, width), rays += 64 * 64;
-      if (test::sanitized()) rays /= 13;
-      EXPECT_GT(hits, rays / 5);
-      EXPECT_LT(hits, 9 * rays / 10);
-    }
   }
 }
 

@@ -33,8 +33,8 @@ struct alignas(64) Beam {
   /// inverse: least and greatest reciprocal of the direction. limits: as RayGroup::limits.
   float origin[3][2], inverse[3][2], limits[2];
   bool stale; ///< whether limits are outdated
-  /// Whether unit-space t is t times unit_scale, and both are floats of usual size. Then hits are recorded a register
-  /// at a time.
+  /// Whether t is a power of two in (2^-60, 2^60) times the grid's t for every ray, and no origin was moved. Then hits
+  /// are recorded a register at a time.
   bool plain;
   float unit_scale[kGroup], grid_scale[kGroup]; ///< t in unit space per t in the grid and the inverse, powers of two
 
@@ -69,7 +69,8 @@ inline void set_scales(const RayGroup& group, Beam& beam) {
   beam.plain = plain == (1u << kDoubleLanes) - 1;
 }
 
-/// Makes a beam of all rays of a group. Returns false if they have no common origin or octant, or are too few.
+/// Makes a beam of all rays of a group. Returns false if they have no common origin or octant, or are too few. Origins
+/// that approach() moved may be equal in floats and differ in `rest`; then they are not common.
 /// @param pad_coordinate as in enter()
 /// @param group its lanes that are not in `rays` get values of one of `rays`, and an empty range of t
 inline bool make_beam(RayGroup& group, float pad_coordinate, uint64_t rays, Beam& beam) {
@@ -78,9 +79,10 @@ inline bool make_beam(RayGroup& group, float pad_coordinate, uint64_t rays, Beam
   for (uint32_t at = 0; at < kGroup; at += kBlock) {
     Ints same = Ints{} - 1;
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      Floats origin;
+      Floats origin, rest;
       read_block(origin, &group.origin[axis][at]);
-      same &= origin == group.origin[axis][first];
+      read_block(rest, &group.rest[axis][at]);
+      same &= (origin == group.origin[axis][first]) & (rest == group.rest[axis][first]);
     }
     if ((static_cast<uint32_t>(rays >> at) & kBlockLanes & ~lane_bits(same)) != 0) return false;
   }

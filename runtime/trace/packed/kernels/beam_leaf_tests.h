@@ -23,24 +23,24 @@ inline void move_to_origin(const DecodedBatch& batch, const RayGroup& group, uin
 }
 
 /// Heights of a batch's triangles above a beam's origin, for rays of one kx.
-struct BeamDepths {
-  alignas(64) float depth[kBatch], residual[kBatch];
+struct BeamHeights {
+  alignas(64) float height[kBatch], residual[kBatch];
 };
 
 template <typename Lanes>
-inline void find_depths(const BeamBatch& batch, const BatchNormals& normals, const RayGroup& group, uint32_t ray,
-                        const uint32_t (&axis)[3], BeamDepths& out) {
+inline void find_heights(const BeamBatch& batch, const BatchNormals& normals, const RayGroup& group, uint32_t ray,
+                         const uint32_t (&axis)[3], BeamHeights& out) {
   const auto relative = [&](uint32_t k, uint32_t corner) { return Lanes::load(batch.corner[axis[k]][corner]); };
   const auto normal = [&](uint32_t k) { return Lanes::load(normals.normal[axis[k]]); };
   const auto rest = [&](uint32_t k) { return Lanes::set(group.rest[axis[k]][ray]); };
-  Lanes::store(out.depth, depth_along<Lanes>(relative, normal));
+  Lanes::store(out.height, height_along<Lanes>(relative, normal));
   Lanes::store(out.residual, residual_along<Lanes>(rest, normal));
 }
 
 /// Tests the rays at `at`, `at` + 1, ... of a beam, one per lane, against one triangle. Returns the lanes with a hit,
 /// as a bit mask. Performs the same arithmetic as test_rays().
 template <typename WideLanes>
-inline uint32_t test_beam_rays(const BeamBatch& batch, const BeamDepths& depths, const BatchNormals& normals,
+inline uint32_t test_beam_rays(const BeamBatch& batch, const BeamHeights& heights, const BatchNormals& normals,
                                uint32_t triangle, const RayGroup& group, const uint32_t (&axis)[3], uint32_t at,
                                uint32_t wanted, LaneHits<WideLanes>& hits, uint64_t& exact_count) {
   using F = typename WideLanes::F;
@@ -55,8 +55,8 @@ inline uint32_t test_beam_rays(const BeamBatch& batch, const BeamDepths& depths,
   };
   return test_relative<WideLanes, true>(
       [&](uint32_t k, uint32_t corner) { return WideLanes::set(batch.corner[axis[k]][corner][triangle]); },
-      [&] { return WideLanes::set(depths.depth[triangle]); },
-      [&](F depth) { return WideLanes::sub(depth, WideLanes::set(depths.residual[triangle])); },
+      [&] { return WideLanes::set(heights.height[triangle]); },
+      [&](F height) { return WideLanes::sub(height, WideLanes::set(heights.residual[triangle])); },
       [&](uint32_t k) { return WideLanes::set(normals.normal[axis[k]][triangle]); }, exact, rays, FineGrid<false>(),
       wanted, hits, exact_count);
 }

@@ -205,9 +205,10 @@ inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, fl
 }
 
 /// Transforms rays into a tree's grid and prepares them for box and triangle tests. Returns the rays that may hit
-/// something, as a bit mask. If nearest hits of rays of one origin are wanted, the caller calls make_beam() or
-/// fill_records() next.
+/// something, as a bit mask.
 /// @tparam kNearest as for move_block()
+/// @tparam kForBeam leaves `limits`, `bias`, `tests` and `rests` unset; the caller then calls make_beam(), and
+/// fill_records() if that returns false
 /// @param pad_coordinate coordinate that the pad of box planes is computed from; a ray's own origin counts instead if
 /// its largest coordinate is larger
 /// @param rays bit mask of the rays to transform

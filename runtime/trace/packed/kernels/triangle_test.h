@@ -224,17 +224,17 @@ inline uint32_t starts_near_plane(Relative relative, Normal normal, typename Lan
 /// Returns the lanes in which a ray hits a triangle, as a bit mask. Avoids unpredictable branches until a lane hits.
 /// @tparam kWeights whether hits are filled in; otherwise only the lanes are computed
 /// @param relative function of (k, corner) that returns the corner's coordinate along Woop's axis k, less the origin's
-/// @param height function that returns depth_along()
-/// @param residual function of this height that takes residual_along() from it
+/// @param height function that returns height_along()
+/// @param residual function that returns a height less residual_along()
 /// @param normal function of k that returns the plane normal's component along Woop's axis k
 /// @param exact function of (lanes, x, y, z, depth, along) that calls test_exactly() and returns its result
 /// @tparam Fine FineGrid<true> if the tree's grid is so fine that sheared corners need doubles near edges, else
 /// FineGrid<false>
 /// @param wanted bit mask of the lanes to test
 /// @param exact_count incremented by the number of lanes that were evaluated in doubles
-template <typename Lanes, bool kWeights, typename Relative, typename Depth, typename Residual, typename Normal,
+template <typename Lanes, bool kWeights, typename Relative, typename Height, typename Residual, typename Normal,
           typename Exact, typename Fine>
-[[gnu::always_inline]] inline uint32_t test_relative(Relative relative, Depth height, Residual residual, Normal normal,
+[[gnu::always_inline]] inline uint32_t test_relative(Relative relative, Height height, Residual residual, Normal normal,
                                                      Exact exact, const RayLanes<Lanes>& rays, Fine, uint32_t wanted,
                                                      LaneHits<Lanes>& hits, uint64_t& exact_count) {
   using F = typename Lanes::F;
@@ -285,12 +285,12 @@ template <typename Lanes, bool kWeights, typename Relative, typename Depth, type
 /// rounding error. t comes from the plane rather than from the weights. On a plane perpendicular to an axis, only the
 /// coordinates along that axis then contribute, which ray offsets rely on.
 template <typename Lanes, typename Relative, typename Normal>
-inline typename Lanes::F depth_along(Relative relative, Normal normal) {
+inline typename Lanes::F height_along(Relative relative, Normal normal) {
   return Lanes::fma(relative(0, 0), normal(0),
                     Lanes::fma(relative(1, 0), normal(1), Lanes::mul(relative(2, 0), normal(2))));
 }
 
-/// Returns what the origin's rounding error takes from depth_along(). For nearest hits it is taken into account: along
+/// Returns what the origin's rounding error takes from height_along(). For nearest hits it is taken into account: along
 /// a grazing ray it is magnified many times.
 template <typename Lanes, typename Rest, typename Normal>
 inline typename Lanes::F residual_along(Rest rest, Normal normal) {
@@ -308,9 +308,9 @@ inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest res
                            Fine fine, uint32_t wanted, LaneHits<Lanes>& hits, uint64_t& exact_count) {
   using F = typename Lanes::F;
   const auto relative = [&](uint32_t k, uint32_t corner) { return Lanes::sub(vertex(k, corner), origin(k)); };
-  const auto residual = [&](F depth) {
-    if constexpr (!kUseResidual) return depth;
-    return Lanes::sub(depth, residual_along<Lanes>(rest, normal));
+  const auto residual = [&](F height) {
+    if constexpr (!kUseResidual) return height;
+    return Lanes::sub(height, residual_along<Lanes>(rest, normal));
   };
   const auto exact = [&](uint32_t lanes, const F(&x)[3], const F(&y)[3], const F(&z)[3], F depth, F along) {
     if constexpr (Fine::value) {
@@ -323,8 +323,8 @@ inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest res
     }
   };
   return test_relative<Lanes, kWeights>(
-      relative, [&] { return depth_along<Lanes>(relative, normal); }, residual, normal, exact, rays, fine, wanted, hits,
-      exact_count);
+      relative, [&] { return height_along<Lanes>(relative, normal); }, residual, normal, exact, rays, fine, wanted,
+      hits, exact_count);
 }
 
 } // namespace

@@ -16,11 +16,13 @@ struct UnitBeam {
   uint32_t octant;
 };
 
-/// Relative widening of bounds, which covers the roundings of their computation.
+/// Relative widening of bounds, 64 u in the units of kBoxPad. It covers the roundings of their computation, and
+/// enlarge_boxes() (28 u) of graded trees, which may_enter() leaves out.
 constexpr float kWiden = 0x1p-18f;
+static_assert(kWiden >= 2.0f * kBeamPad);
 
-/// Sets the directions of a beam from their bounds along one axis, which have one sign.
-inline void set_directions(float least, float most, uint32_t axis, Beam& beam) {
+/// Sets the inverse directions of a beam from the bounds of its directions along one axis, which have one sign.
+inline void set_inverses(float least, float most, uint32_t axis, Beam& beam) {
   constexpr float kLimit = 1.0f / kMinDirectionComponent;
   const bool backward = most <= 0.0f && least < 0.0f;
   const float small = backward ? -most : least, large = backward ? -least : most; // magnitudes
@@ -31,19 +33,27 @@ inline void set_directions(float least, float most, uint32_t axis, Beam& beam) {
 }
 
 /// Finds the bounds of a full group of rays of one origin. Returns false if the beam cannot be used: the rays have
-/// different octants or directions of unusual length.
+/// different octants, a direction of unusual length or an origin far away.
 /// @param max_coordinate largest absolute coordinate of the boxes to test, in unit space
 inline bool make_unit_beam(const UnitRays& rays, float max_coordinate, UnitBeam& out) {
+  // set_inverses() then turns no ray by more than 2^-20, which kWiden covers.
+  constexpr float kLeastLength = 0x1p-60f;
   Floats most[8];
   for (Floats& m : most) m = Floats{} - __builtin_inff();
-  for (uint32_t first = 0; first < kGroup; first += kBlock)
+  Ints usable = Ints{} - 1;
+  for (uint32_t first = 0; first < kGroup; first += kBlock) {
+    Floats length{};
     for (uint32_t axis = 0; axis < 3; ++axis) {
       Floats direction;
       read_block(direction, &rays.direction[axis][first]);
       const Floats opposite = -direction; // NaN is ignored in this order
       most[axis] = opposite > most[axis] ? opposite : most[axis];
       most[3 + axis] = direction > most[3 + axis] ? direction : most[3 + axis];
+      keep_larger(length, magnitude(direction));
     }
+    usable &= length > kLeastLength;
+  }
+  if (lane_bits(usable) != kBlockLanes) return false;
   float bounds[8];
   largest_lanes(most, bounds);
   float away = max_coordinate, largest = 0.0f;
@@ -52,16 +62,16 @@ inline bool make_unit_beam(const UnitRays& rays, float max_coordinate, UnitBeam&
     out.least[axis] = -bounds[axis], out.most[axis] = bounds[3 + axis];
     if (out.least[axis] < 0.0f && out.most[axis] >= 0.0f) return false;
     out.octant |= (out.least[axis] < 0.0f ? 1u : 0u) << axis;
-    set_directions(out.least[axis], out.most[axis], axis, out.beam);
+    set_inverses(out.least[axis], out.most[axis], axis, out.beam);
     away = __builtin_fmaxf(away, __builtin_fabsf(rays.origin[axis][0]));
     largest = __builtin_fmaxf(largest, __builtin_fmaxf(-out.least[axis], out.most[axis]));
   }
-  if (!(largest > 0x1p-60f && largest < 0x1p60f && away < 0x1p60f)) return false;
+  if (!(largest < 0x1p60f && away < 0x1p60f)) return false;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const float pad = ((out.octant >> axis) & 1u) != 0 ? -kWiden * away : kWiden * away;
     out.beam.origin[axis][0] = rays.origin[axis][0] + pad, out.beam.origin[axis][1] = -rays.origin[axis][0] + pad;
   }
-  out.beam.limits[0] = 0.0f, out.beam.limits[1] = -0x1p100f;
+  out.beam.limits[0] = 0.0f, out.beam.limits[1] = -__builtin_inff();
   return true;
 }
 
@@ -85,7 +95,7 @@ inline bool may_enter(const TracePlacement& placement, const TraceTree& tree, co
     if (!(least > size * 0x1p-20 || most < size * -0x1p-20)) return true;
     if (!(size > 0x1p-60 && size < 0x1p60)) return true;
     octant |= (most < 0.0 ? 1u : 0u) << axis;
-    set_directions(static_cast<float>(least), static_cast<float>(most), axis, beam);
+    set_inverses(static_cast<float>(least), static_cast<float>(most), axis, beam);
     away = __builtin_fmax(away, __builtin_fabs(origin[axis]));
   }
   if (!(away < 0x1p60)) return true;
@@ -94,7 +104,7 @@ inline bool may_enter(const TracePlacement& placement, const TraceTree& tree, co
                 pad = ((octant >> axis) & 1u) != 0 ? -by : by;
     beam.origin[axis][0] = at + pad, beam.origin[axis][1] = -at + pad;
   }
-  beam.limits[0] = 0.0f, beam.limits[1] = -0x1p120f;
+  beam.limits[0] = 0.0f, beam.limits[1] = -__builtin_inff();
   float t[baked::kNodeWidth];
   return (pass_beam(Boxes(*tree.nodes, octant), beam, t) & NodeChildren(*tree.nodes).slots()) != 0;
 }

@@ -56,7 +56,8 @@ public:
   /// @param first index of the first ray
   bool trace_run(uint32_t first) {
     const KernelRay& a = rays_[first];
-    for (const uint32_t other : {7u, kGroup - 8, kGroup - 1}) { // the corners of a block of 8 x 8 pixels
+    // With the first ray, the corners of the four blocks of 4 x 4 pixels.
+    for (const uint32_t other : {12u, 51u, kGroup - 1}) {
       const KernelRay& b = rays_[first + other];
       for (uint32_t axis = 0; axis < 3; ++axis)
         if (b.origin[axis] != a.origin[axis] ||
@@ -76,7 +77,7 @@ public:
     return true;
   }
 
-  /// Does the same, and keeps the hits found so far: each ray ends at its nearest hit.
+  /// Does the same as take(), and keeps the hits found so far: each ray ends at its nearest hit.
   void take_with_hits(const uint32_t* numbers, uint32_t count) {
     take(numbers, count);
     if constexpr (!kAny)

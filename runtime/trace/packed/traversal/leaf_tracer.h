@@ -121,7 +121,7 @@ private:
     return rays;
   }
 
-  /// Does the same for a beam, with fewer rays than triangles, too.
+  /// The same for the rays of a beam; registers with at least half as many rays as the batch has triangles are enough.
   [[gnu::noinline]] uint64_t test_beam(const DecodedBatch& batch, const BatchNormals& normals, Place place,
                                        RayGroup& group, uint64_t rays) {
     using WideLanes = typename Lanes::WideLanes;
@@ -133,8 +133,8 @@ private:
       const uint64_t same = rays & group.major[k0];
       if (same == 0) continue;
       const uint32_t axis[3] = {k0, k0 == 2 ? 0 : k0 + 1, k0 == 0 ? 2 : k0 - 1};
-      BeamDepths depths;
-      find_depths<Lanes>(moved, normals, group, first_bit(same), axis, depths);
+      BeamHeights heights;
+      find_heights<Lanes>(moved, normals, group, first_bit(same), axis, heights);
       for (uint32_t at = 0; at < kGroup; at += WideLanes::kLanes) {
         const uint32_t wanted = lanes_at<WideLanes>(same, at);
         if (wanted == 0 || !prefers_rays_in_lanes(count_ones(wanted), batch.count)) continue;
@@ -143,7 +143,7 @@ private:
           LaneHits<WideLanes> hits;
           uint64_t exact = 0;
           uint32_t lanes =
-              test_beam_rays<WideLanes>(moved, depths, normals, triangle, group, axis, at, wanted, hits, exact);
+              test_beam_rays<WideLanes>(moved, heights, normals, triangle, group, axis, at, wanted, hits, exact);
           if constexpr (kCount) counters_->exact_triangles += exact;
           if (lanes == 0) continue;
           place.triangle = begin + triangle;
