@@ -58,7 +58,7 @@ public:
 private:
   bin_kernels::Run run(std::span<uint32_t> order) const {
     static_assert(sizeof(TreeBox) == 6 * sizeof(float));
-    return {boxes_[0].lo.data(), order.data(), static_cast<uint32_t>(order.size())};
+    return {reinterpret_cast<const float*>(boxes_.data()), order.data(), static_cast<uint32_t>(order.size())};
   }
 
   /// Moves the half with the lower centres along the longest axis to the left.

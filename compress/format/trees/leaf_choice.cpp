@@ -50,22 +50,17 @@ private:
     alignas(16) float of_right[2 * kWidth]; // [kWidth + i - 1]: cost of the right side as at most i leaves
     std::fill_n(of_right, kWidth, kInfinity);
     std::copy_n(right.leaf_cost, kWidth, of_right + kWidth);
-    Float4 low = load(out.leaf_cost), high = load(out.leaf_cost + 4);
+    Float4 low = load_lanes(out.leaf_cost), high = load_lanes(out.leaf_cost + 4);
     for (uint32_t k = 1; k < kWidth; ++k) {
       const float on_left = left.leaf_cost[k - 1];
       const float* on_right = of_right + kWidth - k;
-      low = min_of(low, on_left + load(on_right));
-      high = min_of(high, on_left + load(on_right + 4));
+      low = min_of(low, on_left + load_lanes(on_right));
+      high = min_of(high, on_left + load_lanes(on_right + 4));
     }
     std::memcpy(out.leaf_cost, &low, sizeof low);
     std::memcpy(out.leaf_cost + 4, &high, sizeof high);
   }
 
-  static Float4 load(const float* lanes) {
-    Float4 out;
-    std::memcpy(&out, lanes, sizeof out);
-    return out;
-  }
   static Float4 min_of(Float4 a, Float4 b) { return a < b ? a : b; }
 
   /// Number of leaves on the left in the cheapest division of both sides into `slots` leaves; 0 if one leaf costs the

@@ -15,49 +15,38 @@ namespace packtrace {
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = int32_t __attribute__((vector_size(16)));
 
-inline Float4 max_of(Float4 a, Float4 b) { return a > b ? a : b; }
-
-/// A box in SIMD lanes. The low end is negated, so that one maximum per vector extends the box.
-struct FloatBox {
-  Float4 minus_lo, hi; ///< the fourth lanes are 0
-
-  static FloatBox of(const sweep_kernels::Box& box) {
-    FloatBox out;
-    static_assert(sizeof out == sizeof box);
-    std::memcpy(&out, &box, sizeof out);
-    return out;
-  }
-  static FloatBox of(const TreeGridBox& box) {
-    float lanes[8]{};
-    for (size_t axis = 0; axis < 3; ++axis)
-      lanes[axis] = -static_cast<float>(box.lo[axis]), lanes[4 + axis] = static_cast<float>(box.hi[axis]);
-    FloatBox out;
-    std::memcpy(&out, lanes, sizeof out);
-    return out;
-  }
-  sweep_kernels::Box stored() const {
-    sweep_kernels::Box out;
-    std::memcpy(&out, this, sizeof out);
-    return out;
-  }
-  void extend(const FloatBox& other) {
-    minus_lo = max_of(minus_lo, other.minus_lo);
-    hi = max_of(hi, other.hi);
-  }
-};
-
-/// Half the surface area of a box, in the first lane.
-inline Float4 half_area(const FloatBox& box) {
-  const Float4 size = box.hi + box.minus_lo;
-  const Float4 faces = size * __builtin_shufflevector(size, size, 1, 2, 0, 3);
-  return faces + __builtin_shufflevector(faces, faces, 1, 0, 3, 2) + __builtin_shufflevector(faces, faces, 2, 3, 0, 1);
+inline Float4 load_lanes(const float* lanes) {
+  Float4 out;
+  std::memcpy(&out, lanes, sizeof out);
+  return out;
 }
 
-/// Returns the first lane. Goes through memory because GCC 12 reads vector lanes wrongly under sanitizers.
-inline float first_lane(const Float4& lanes) {
-  float first;
-  std::memcpy(&first, &lanes, sizeof first);
-  return first;
+/// Returns a box of integers in floats.
+inline sweep_kernels::Box sweep_box(const TreeGridBox& box) {
+  sweep_kernels::Box out{};
+  for (size_t axis = 0; axis < 3; ++axis)
+    out.minus_lo[axis] = -static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
+  return out;
+}
+
+inline void extend(sweep_kernels::Box& box, const sweep_kernels::Box& other) {
+  const auto extend_end = [](float* end, const float* other_end) {
+    const Float4 a = load_lanes(end), b = load_lanes(other_end), most = a > b ? a : b;
+    std::memcpy(end, &most, sizeof most);
+  };
+  extend_end(box.minus_lo, other.minus_lo);
+  extend_end(box.hi, other.hi);
+}
+
+/// Half the surface area of a box.
+inline float half_area(const sweep_kernels::Box& box) {
+  const Float4 size = load_lanes(box.hi) + load_lanes(box.minus_lo);
+  const Float4 faces = size * __builtin_shufflevector(size, size, 1, 2, 0, 3);
+  const Float4 sums =
+      faces + __builtin_shufflevector(faces, faces, 1, 0, 3, 2) + __builtin_shufflevector(faces, faces, 2, 3, 0, 1);
+  float area; // goes through memory because GCC 12 reads vector lanes wrongly under sanitizers
+  std::memcpy(&area, &sums, sizeof area);
+  return area;
 }
 
 /// A node of a binary tree over runs of a cluster's triangles, stored in preorder: the left child is the next node.

@@ -13,7 +13,7 @@ static_assert(kMaxClusterTriangles <= sweep_kernels::kMaxBoxes);
 class RunTree {
 public:
   explicit RunTree(std::span<const TreeGridBox> boxes) {
-    for (size_t i = 0; i < boxes.size(); ++i) boxes_[i] = FloatBox::of(boxes[i]).stored();
+    for (size_t i = 0; i < boxes.size(); ++i) boxes_[i] = sweep_box(boxes[i]);
     build(0, static_cast<uint32_t>(boxes.size()));
   }
   std::span<RunNode> nodes() { return std::span(nodes_).first(size_); }
@@ -25,9 +25,9 @@ private:
     node.first = static_cast<uint8_t>(first), node.count = static_cast<uint8_t>(count), node.right = 0;
     uint32_t left = 1; // two boxes have one split
     if (count <= 2) {
-      FloatBox box = FloatBox::of(boxes_[first]);
-      box.extend(FloatBox::of(boxes_[first + count - 1]));
-      node.area = first_lane(half_area(box));
+      sweep_kernels::Box box = boxes_[first];
+      extend(box, boxes_[first + count - 1]);
+      node.area = half_area(box);
       if (count == 1) return;
     } else {
       const sweep_kernels::Split best = kernels_.split_run(boxes_.data() + first, count);

@@ -31,18 +31,18 @@ public:
       TreeGridBox box;
       for (size_t axis = 0; axis < 3; ++axis)
         box.lo[axis] = box.hi[axis] = static_cast<int32_t>((points[i][axis] - lo[axis]) >> shift);
-      boxes_[i] = FloatBox::of(box);
+      boxes_[i] = sweep_box(box);
     }
   }
-  FloatBox of(const Triangle& triangle) const {
-    FloatBox box = boxes_[triangle.x];
-    box.extend(boxes_[triangle.y]);
-    box.extend(boxes_[triangle.z]);
+  sweep_kernels::Box of(const Triangle& triangle) const {
+    sweep_kernels::Box box = boxes_[triangle.x];
+    extend(box, boxes_[triangle.y]);
+    extend(box, boxes_[triangle.z]);
     return box;
   }
 
 private:
-  std::array<FloatBox, kMaxClusterVertices> boxes_;
+  std::array<sweep_kernels::Box, kMaxClusterVertices> boxes_;
 };
 
 /// A binary tree over boxes in any order. Each node of more than kUndivided boxes takes the split with the lowest
@@ -54,9 +54,9 @@ public:
     const auto count = static_cast<uint32_t>(triangles.size());
     std::array<std::array<int32_t, 4>, kMaxClusterTriangles> centres; // twice the centres
     for (uint32_t i = 0; i < count; ++i) {
-      const FloatBox box = points.of(triangles[i]);
-      boxes_[i] = box.stored();
-      const Int4 centre = __builtin_convertvector(box.hi, Int4) - __builtin_convertvector(box.minus_lo, Int4);
+      const sweep_kernels::Box& box = boxes_[i] = points.of(triangles[i]);
+      const Int4 centre =
+          __builtin_convertvector(load_lanes(box.hi), Int4) - __builtin_convertvector(load_lanes(box.minus_lo), Int4);
       std::memcpy(centres[i].data(), &centre, sizeof centre);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -89,9 +89,9 @@ private:
     RunNode& node = nodes_[number];
     node.first = static_cast<uint8_t>(first), node.count = static_cast<uint8_t>(count), node.right = 0;
     if (count <= kUndivided) {
-      FloatBox box = FloatBox::of(boxes_[order_[0][first]]);
-      for (uint32_t i = 1; i < count; ++i) box.extend(FloatBox::of(boxes_[order_[0][first + i]]));
-      node.area = first_lane(half_area(box));
+      sweep_kernels::Box box = boxes_[order_[0][first]];
+      for (uint32_t i = 1; i < count; ++i) extend(box, boxes_[order_[0][first + i]]);
+      node.area = half_area(box);
       return;
     }
     const uint32_t left = split(first, count, node.area);

@@ -10,21 +10,16 @@
 
 #include "compress/format/trees/bin_kernels.h"
 #include "compress/format/trees/box_tree.h"
-#include "pbrt_import/base/cpu.h"
+#include "tests/compress/bvh/kernel_sets.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
 namespace {
 
 using bin_kernels::Bins;
+using test::kernel_sets;
 
-std::vector<const bin_kernels::Kernels*> bin_kernel_sets() {
-  std::vector<const bin_kernels::Kernels*> all{&bin_kernels::kPortable};
-#if defined(__x86_64__)
-  if (cpu_has_avx2()) all.push_back(&bin_kernels::kAvx2);
-#endif
-  return all;
-}
+const float* floats_of(const std::vector<TreeBox>& boxes) { return reinterpret_cast<const float*>(boxes.data()); }
 
 /// @param places number of different coordinates along x; along z all centres are equal
 std::vector<TreeBox> boxes_at(uint32_t count, uint32_t places, test::Random& random) {
@@ -98,9 +93,9 @@ TEST(BinKernels, SplitWhereItCostsLeast) {
         std::iota(numbers.begin(), numbers.end(), 0u);
         std::vector<uint32_t> wanted = numbers;
         const uint32_t left = split_plainly(boxes, bins, unit, wanted);
-        for (const bin_kernels::Kernels* kernels : bin_kernel_sets()) {
+        for (const bin_kernels::Kernels* kernels : kernel_sets(bin_kernels::kPortable, bin_kernels::kernels())) {
           std::vector<uint32_t> order = numbers;
-          EXPECT_EQ(kernels->split({boxes[0].lo.data(), order.data(), count}, bins, unit), left);
+          EXPECT_EQ(kernels->split({floats_of(boxes), order.data(), count}, bins, unit), left);
           EXPECT_EQ(order, wanted);
         }
       }
@@ -114,8 +109,8 @@ TEST(BinKernels, EqualCentresAreNotSplit) {
   }
   std::vector<uint32_t> order(boxes.size());
   std::iota(order.begin(), order.end(), 0u);
-  for (const bin_kernels::Kernels* kernels : bin_kernel_sets())
-    EXPECT_EQ(kernels->split({boxes[0].lo.data(), order.data(), 100}, bins_of(boxes, 64), 1), 0u);
+  for (const bin_kernels::Kernels* kernels : kernel_sets(bin_kernels::kPortable, bin_kernels::kernels()))
+    EXPECT_EQ(kernels->split({floats_of(boxes), order.data(), 100}, bins_of(boxes, 64), 1), 0u);
 }
 
 TEST(BinKernels, MeasureBoxesAndCentres) {
@@ -125,11 +120,11 @@ TEST(BinKernels, MeasureBoxesAndCentres) {
   std::vector<TreeBox> chosen;
   for (const uint32_t i : numbers) chosen.push_back(boxes[i]);
   const TreeBox whole = bounds_of(chosen);
-  for (const bin_kernels::Kernels* kernels : bin_kernel_sets())
+  for (const bin_kernels::Kernels* kernels : kernel_sets(bin_kernels::kPortable, bin_kernels::kernels()))
     for (uint32_t count = 1; count <= numbers.size(); ++count) {
       std::vector<uint32_t> order = numbers;
       bin_kernels::RunBounds bounds;
-      kernels->measure({boxes[0].lo.data(), order.data(), count}, bounds);
+      kernels->measure({floats_of(boxes), order.data(), count}, bounds);
       for (size_t axis = 0; axis < 3; ++axis) {
         double low = std::numeric_limits<double>::infinity(), high = -low;
         for (uint32_t i = 0; i < count; ++i) {

@@ -6,7 +6,7 @@
 
 #include "compress/format/trees/leaf_restorer.h"
 #include "compress/format/trees/node_writer.h"
-#include "pbrt_import/base/cpu.h"
+#include "tests/compress/bvh/kernel_sets.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
 
@@ -14,14 +14,6 @@ namespace packtrace {
 namespace {
 
 using baked::PackedNode;
-
-std::vector<const node_kernels::Kernels*> all_kernels() {
-  std::vector<const node_kernels::Kernels*> all{&node_kernels::kPortable};
-#if defined(__x86_64__)
-  if (cpu_has_avx2()) all.push_back(&node_kernels::kAvx2);
-#endif
-  return all;
-}
 
 LeafNode random_leaves(uint32_t triangle_count, test::Random& random) {
   LeafNode leaves;
@@ -79,14 +71,14 @@ BakedFile bake_precisely(const Mesh& mesh, double precision) {
 }
 
 TEST(LeafRestorer, MakesTheNodesThatBoxesOfTrianglesGive) {
-  for (const auto* kernels : all_kernels()) {
+  for (const auto* kernels : test::kernel_sets(node_kernels::kPortable, node_kernels::kernels())) {
     EXPECT_LE(compare(bake_precisely(test::sphere_mesh(30), 1e-4), *kernels), 57u);
     EXPECT_LE(compare(bake_precisely(test::soup_mesh(3000, 5), 1e-3), *kernels), 57u);
   }
 }
 
 TEST(LeafRestorer, ReadsVerticesWiderThanAWord) {
-  for (const auto* kernels : all_kernels())
+  for (const auto* kernels : test::kernel_sets(node_kernels::kPortable, node_kernels::kernels()))
     EXPECT_GT(compare(bake_precisely(test::soup_mesh(2000, 6), 1e-7), *kernels), 57u);
 }
 

@@ -182,7 +182,7 @@ TEST(LeafNodes, EveryTriangleIsInOneLeafInOrder) {
       std::vector<LeafNode> nodes;
       TreeGridBox whole = boxes[0];
       for (const TreeGridBox& box : boxes) whole.extend(box);
-      find_leaf_nodes(boxes, {}, typical_node_area(first_lane(half_area(FloatBox::of(whole))), count), nodes);
+      find_leaf_nodes(boxes, {}, typical_node_area(half_area(sweep_box(whole)), count), nodes);
       uint32_t next = 0;
       for (const LeafNode& node : nodes) {
         EXPECT_EQ(node.first_triangle, next);

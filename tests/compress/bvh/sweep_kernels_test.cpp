@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "compress/format/trees/sweep_kernels.h"
-#include "pbrt_import/base/cpu.h"
+#include "tests/compress/bvh/kernel_sets.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -18,14 +18,7 @@ namespace {
 
 using sweep_kernels::Box;
 using sweep_kernels::Split;
-
-std::vector<const sweep_kernels::Kernels*> sweep_kernel_sets() {
-  std::vector<const sweep_kernels::Kernels*> all{&sweep_kernels::kPortable};
-#if defined(__x86_64__)
-  if (cpu_has_avx2()) all.push_back(&sweep_kernels::kAvx2);
-#endif
-  return all;
-}
+using test::kernel_sets;
 
 /// Boxes with corners below `limit`; of a small limit many splits cost the same.
 std::vector<Box> random_sweep_boxes(uint32_t count, uint32_t limit, test::Random& random) {
@@ -82,7 +75,7 @@ TEST(SweepKernels, FindTheBestSplitOfARun) {
       std::vector<uint8_t> order(count);
       std::iota(order.begin(), order.end(), uint8_t{0});
       const Split wanted = best_split(boxes, {&order, 1});
-      for (const sweep_kernels::Kernels* kernels : sweep_kernel_sets())
+      for (const sweep_kernels::Kernels* kernels : kernel_sets(sweep_kernels::kPortable, sweep_kernels::kernels()))
         expect_equal(kernels->split_run(boxes.data(), count), wanted);
     }
 }
@@ -101,7 +94,7 @@ TEST(SweepKernels, FindTheBestSplitOfThreeOrders) {
       }
       const Split wanted = best_split(boxes, orders);
       const std::array<const uint8_t*, 3> pointers{orders[0].data(), orders[1].data(), orders[2].data()};
-      for (const sweep_kernels::Kernels* kernels : sweep_kernel_sets())
+      for (const sweep_kernels::Kernels* kernels : kernel_sets(sweep_kernels::kPortable, sweep_kernels::kernels()))
         expect_equal(kernels->split_orders(boxes.data(), pointers.data(), count), wanted);
     }
 }
