@@ -153,7 +153,7 @@ private:
     probes_ = std::move(ordered);
   }
 
-  /// Numbers of nodes over `probes` and over probes + 1 probes.
+  /// Numbers of nodes of trees of `probes` and of `probes` + 1 probes; every node is cut into halves.
   static std::array<size_t, 2> node_counts(size_t probes) {
     if (probes < kLeafPoints) return {1, 1};
     const auto [half, more] = node_counts(probes / 2);

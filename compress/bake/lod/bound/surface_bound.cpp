@@ -86,7 +86,7 @@ private:
     if (links_.empty() || links_.back() != SurfaceLink{source, simplified}) links_.push_back({source, simplified});
   }
 
-  /// Parts of both triangles lie within the distance of each other.
+  /// Part of the source triangle lies within the distance of the simplified triangle.
   void note(uint32_t simplified, uint32_t source, double distance) {
     note_simplified(simplified, source, distance);
     bounds_[source] = std::max(bounds_[source], stated_error(distance, inherited_error(source)));
