@@ -52,26 +52,60 @@ class TriangleImagesOf : public testing::TestWithParam<double> {
 protected:
   TriangleImagesOf() { after_.link(); }
 
-  /// Distance of a point from the whole simplified surface.
-  double distance(const DVec3& p) const {
-    double least = 1e300;
-    for (uint32_t s = 0; s < s_.mesh.triangles.size(); ++s) least = std::min(least, after_.surface().distance(p, s));
-    return least;
-  }
-
+  struct OutlinePoint {
+    uint32_t simplified; ///< a triangle that the outline meets there
+    DVec3 at;
+  };
   /// Corners and crossings of a triangle's image.
-  std::vector<DVec3> outline_of(uint32_t t) {
+  std::vector<OutlinePoint> outline_of(uint32_t t) {
     const Triangle& p = s_.triangles[t].points;
-    std::vector<DVec3> outline;
+    std::vector<OutlinePoint> outline;
+    uint32_t starts[3], ends[3];
     for (int i = 0; i < 3; ++i) {
-      const SurfaceWalk::EdgePath& way =
-          walk_.way(s_.mesh.side_edges[3 * size_t{t} + static_cast<size_t>(i)], p[i], p[(i + 1) % 3]);
-      for (uint32_t k = way.first; k < way.first + way.count; ++k) outline.push_back(walk_.crossing(k).point());
-      outline.push_back(walk_.place(p[i]).at);
+      const uint32_t a = p[i], b = p[(i + 1) % 3];
+      const SurfaceWalk::EdgePath& way = walk_.way(s_.mesh.side_edges[3 * size_t{t} + static_cast<size_t>(i)], a, b);
+      const bool along = way.state == SurfaceWalk::EdgePath::State::kAlong;
+      std::vector<uint32_t> met{along && a > b ? way.right : way.start}, crossings;
+      for (uint32_t k = way.first; !along && k < way.first + way.count; ++k)
+        crossings.push_back(k), met.push_back(walk_.into(k));
+      if (a > b) std::reverse(met.begin(), met.end()), std::reverse(crossings.begin(), crossings.end());
+      starts[i] = met.front(), ends[i] = met.back();
+      outline.push_back({met[0], walk_.place(a).at});
+      for (size_t k = 0; k < crossings.size(); ++k)
+        for (const uint32_t side : {met[k], met[k + 1]})
+          outline.push_back({side, walk_.crossing(crossings[k]).point()});
+      outline.push_back({ends[i], walk_.place(b).at});
+    }
+    for (int i = 0; i < 3; ++i) { // turns around corners
+      const SurfaceWalk::Place& place = walk_.place(p[i]);
+      if (place.state != SurfaceWalk::Place::State::kPoint) continue;
+      for (uint32_t last = ends[(i + 2) % 3]; last != starts[i];)
+        outline.push_back({last = walk_.across(last, place.number), place.at});
     }
     return outline;
   }
 
+  /// Checks points between those of an image's outline in the same simplified triangle, and the image's inner point.
+  void expect_near_source(uint32_t t, const TriangleImages::Image& image,
+                          const std::vector<TriangleImages::Piece>& pieces) {
+    const std::vector<OutlinePoint> outline = outline_of(t);
+    for (const TriangleImages::Piece& piece : pieces) {
+      double back = 0.0;
+      for (const TriangleImages::Piece& other : pieces)
+        if (other.simplified == piece.simplified) back = std::max(back, other.back);
+      std::vector<DVec3> inside;
+      if (image.point != TriangleImages::kNone) inside.push_back(walk_.point(image.point));
+      for (const OutlinePoint& point : outline)
+        if (point.simplified == piece.simplified) inside.push_back(point.at);
+      for (size_t i = 0; i < inside.size(); ++i)
+        for (size_t k = i; k < inside.size(); ++k)
+          for (size_t m = k; m < inside.size(); ++m, ++between_)
+            EXPECT_LE(walk_.source().distance((inside[i] + inside[k] + inside[m]) / 3.0, t), back + 1e-9)
+                << "triangle " << t;
+    }
+  }
+
+  size_t between_ = 0; ///< points checked
   const Simplified s_{GetParam()};
   SurfaceSide after_{{s_.mesh.points, s_.mesh.triangles}};
   SurfaceWalk walk_{{s_.points, s_.triangles}, after_, s_.mesh};
@@ -92,7 +126,7 @@ TEST_P(TriangleImagesOf, BoundsTheDistanceOfEveryTriangle) {
       closer = std::max(closer, piece.there), back = std::max(back, piece.back);
     EXPECT_LE(closer, image.distance);
     EXPECT_LE(back, image.distance);
-    for (const DVec3& at : outline_of(t)) EXPECT_LE(walk_.source().distance(at, t), back + 1e-9) << "triangle " << t;
+    expect_near_source(t, image, pieces);
     EXPECT_LE(image.inside, image.distance);
     const Triangle& p = s_.triangles[t].points;
     for (int i = 0; i <= 8; ++i)
@@ -100,10 +134,14 @@ TEST_P(TriangleImagesOf, BoundsTheDistanceOfEveryTriangle) {
         const DVec3 at = (static_cast<double>(i) * s_.points[p.x] + static_cast<double>(k) * s_.points[p.y] +
                           static_cast<double>(8 - i - k) * s_.points[p.z]) /
                          8.0;
-        EXPECT_LE(distance(at), closer + 1e-9) << "triangle " << t;
+        double beyond = 1e300; // the distance from a piece's triangle less its bound
+        for (const TriangleImages::Piece& piece : pieces)
+          beyond = std::min(beyond, after_.surface().distance(at, piece.simplified) - piece.there);
+        EXPECT_LE(beyond, 1e-9) << "triangle " << t;
       }
   }
   EXPECT_GT(mapped, s_.triangles.size() / 2);
+  EXPECT_GT(between_, mapped);
 }
 
 TEST_P(TriangleImagesOf, CoverTrianglesAfterOnceAwayFromBorders) {
@@ -138,7 +176,12 @@ TEST(SurfaceWalk, PlacesPointsOfSteepSurfacesAndConnectsThem) {
   SurfaceSide after{{s.mesh.points, s.mesh.triangles}};
   after.link();
   SurfaceWalk walk({s.points, s.triangles}, after, s.mesh);
-  size_t paths = 0, found = 0;
+  const auto facing = [&](uint32_t p) {
+    DVec3 sum(0.0);
+    for (const uint32_t t : after.around(s.mesh.stands_for[p])) sum += walk.area_normal(t);
+    return sum;
+  };
+  size_t paths = 0, found = 0, around = 0;
   for (uint32_t p = 0; p < s.points.size(); ++p) EXPECT_NE(walk.place(p).state, SurfaceWalk::Place::State::kNowhere);
   for (uint32_t t = 0; t < s.triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
@@ -147,8 +190,13 @@ TEST(SurfaceWalk, PlacesPointsOfSteepSurfacesAndConnectsThem) {
       const SurfaceWalk::EdgePath& way = walk.way(s.mesh.side_edges[3 * size_t{t} + static_cast<size_t>(i)], a, b);
       ++paths, found += way.state != SurfaceWalk::EdgePath::State::kNowhere;
       if (way.state != SurfaceWalk::EdgePath::State::kAcross) continue;
+      // Only paths around points leave the plane of the edge and the normals before their last crossing.
+      const DVec3 left = glm::normalize(glm::cross(facing(a) + facing(b), s.points[b] - s.points[a]));
+      bool off_plane = false;
       double last = 0.0;
       for (uint32_t k = way.first; k < way.first + way.count; ++k) {
+        off_plane |=
+            k + 1 < way.first + way.count && std::abs(glm::dot(left, walk.crossing(k).point() - s.points[a])) > 1e-3;
         const SurfaceWalk::Crossing& c = walk.crossing(k);
         const uint32_t from = k == way.first ? way.start : walk.into(k - 1);
         for (const uint32_t side : {from, c.into}) EXPECT_LE(after.surface().distance(c.point(), side), 1e-9);
@@ -160,7 +208,9 @@ TEST(SurfaceWalk, PlacesPointsOfSteepSurfacesAndConnectsThem) {
                              c.point() - s.points[a] - c.on * (s.points[b] - s.points[a])),
                     1e-6);
       }
+      around += off_plane;
     }
+  EXPECT_GT(around, 0u);
   EXPECT_GT(found, paths * 9 / 10) << found << " of " << paths;
 }
 
