@@ -11,7 +11,7 @@ namespace packtrace {
 
 /// The order in which the new points of a cluster are coded: next comes the point that is enclosed best by points that
 /// are known already, because it can be predicted best.
-/// Source: Cohen-Or, Cohen, Irony, "Multi-way geometry encoding" (2002), whose traversal this order is.
+/// Source of the idea: Cohen-Or, Cohen and Irony, "Multi-way geometry encoding" (2002).
 class PointOrder {
 public:
   /// What is known around a corner of a new point.
