@@ -36,7 +36,6 @@ struct Grid {
   }
   /// All points below `first_new` are known.
   PointOrder order(uint32_t first_new) {
-    for (uint32_t i = 0; i < first_new; ++i) points[i].known = true;
     PointOrder order;
     order.begin(triangles, end_ + 1, first_new, 0);
     return order;
@@ -110,7 +109,6 @@ TEST(PositionPredictor, PlaneGridsArePredictedExactlyFromTwoRows) {
       (void)predictor.models(axis);
       predictor.learn_error(0);
     }
-    grid.points[point].known = true;
     predictor.learn_position(grid.points[point].position);
     order.learn(point);
   }
@@ -177,7 +175,6 @@ TEST(PositionPredictor, ModelsStayInRangeForPointsWithoutGuess) {
   for (const uint32_t neighbours : {2u, 1u, 0u}) { // known ones in the only triangle
     ExtremeGrid grid;
     const auto first = static_cast<uint32_t>(grid.points.size()), corner = grid.triangles.count();
-    for (PagePoint& point : grid.points) point.known = true;
     grid.points.resize(first + 3);
     add_triangle(grid.points, grid.triangles, {neighbours > 0 ? 0 : first + 1, neighbours > 1 ? 2 : first + 2, first});
     PointOrder order;
@@ -199,7 +196,6 @@ TEST(PointOrder, FansAndDegenerateTrianglesGiveEveryPointOnce) {
     else
       add_triangle(points, triangles, {a, i % 4 == 2 ? a : i % 2, b});
   }
-  points[0].known = points[1].known = true;
   PointOrder order;
   order.begin(triangles, static_cast<uint32_t>(points.size()), 2, first_corner);
   ASSERT_EQ(order.count(), kMaxClusterVertices);
@@ -209,14 +205,14 @@ TEST(PointOrder, FansAndDegenerateTrianglesGiveEveryPointOnce) {
     const uint32_t point = order.next();
     ASSERT_GE(point, 2u);
     ASSERT_LT(point, points.size());
-    ASSERT_FALSE(points[point].known);
+    ASSERT_FALSE(order.known(point));
     predictor.predict(points, triangles, order, point);
     for (size_t axis = 0; axis < 3; ++axis) {
       (void)predictor.models(axis);
       predictor.learn_error(1);
     }
-    points[point].known = true;
     order.learn(point);
+    ASSERT_TRUE(order.known(point));
   }
 }
 
@@ -230,7 +226,6 @@ TEST(PositionPredictor, UsesSomeOfManyCorners) {
     const LatticePoint near{std::lround(1000 * std::cos(angle)), std::lround(1000 * std::sin(angle)), 40};
     points[i].position = near;
     points[kRim + i].position = {2 * near[0], 2 * near[1], 40};
-    points[i].known = points[kRim + i].known = true;
     const uint32_t next = (i + 1) % kRim;
     add_triangle(points, triangles, {i, kRim + i, next});
   }

@@ -35,7 +35,6 @@ struct alignas(64) PagePoint {
   BorderEnds apex;                     ///< corners that face the edges to `next`
   uint32_t cluster = 0;                ///< last cluster with a vertex here
   uint16_t vertex = 0;                 ///< newest vertex of that cluster here
-  bool known = false;                  ///< whether the position has been coded
   uint8_t triangles = 0;               ///< triangles here so far, at most kMaxCountedTriangles
   std::array<uint8_t, 3> error_bits{}; ///< bit widths of the position's coded errors
 };

@@ -15,7 +15,7 @@ namespace context {
 inline constexpr uint32_t kStripCorner = 0, kFirstCorner = 1, kSecondCorner = 2, kThirdCorner = 3; // kinds of corners
 // 4 states of open edges x 8 counts of triangles at each of two corners
 inline constexpr uint32_t kTurn = 0;
-// 12 states of the guesses x 8 and 4 counts of triangles at the two corners before
+// 12 states of the guesses x 8 counts of triangles at the second corner x 4 at the first
 inline constexpr uint32_t kStripNaming = kTurn + 256;
 // 3 corners of a strip's first triangle x 12 states of the guesses
 inline constexpr uint32_t kNaming = kStripNaming + 384;

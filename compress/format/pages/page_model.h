@@ -186,7 +186,7 @@ private:
     bool has_normals = false, has_uvs = false;
   } last_;
   NormalPredictor normals_;
-  std::vector<PagePointNormals> normals_at_; // per point; shorter than points_ after clusters without normals
+  std::vector<PagePointNormals> normals_at_; // per point; shorter than points_ if the last clusters have no normals
 };
 
 } // namespace packtrace

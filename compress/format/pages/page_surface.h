@@ -275,7 +275,6 @@ private:
       predictor_.learn_error(error);
       point.position[axis] = static_cast<int64_t>(predicted + wrap(error));
     }
-    point.known = true;
     point.error_bits = predictor_.error_bits();
     predictor_.learn_position(point.position);
   }

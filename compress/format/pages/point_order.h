@@ -63,6 +63,9 @@ public:
     return first_point_ + kMaxClusterVertices - 1 - (static_cast<uint32_t>(best) - 1) % kMaxClusterVertices;
   }
 
+  /// Whether a point is not new, or has become known.
+  bool known(uint32_t point) const { return point < first_point_ || keys_[point - first_point_] < 0; }
+
   /// Number of corners at a new point.
   uint32_t corner_count(uint32_t point) const {
     return uint32_t{ends_[point - first_point_]} - begins_[point - first_point_];
@@ -88,7 +91,7 @@ public:
 private:
   static constexpr uint32_t kMaxCorners = 3 * kMaxClusterTriangles;
   static constexpr uint16_t kOld = kMaxClusterVertices, kNoCorner = 0xffff; // points and corners of other clusters
-  static constexpr int32_t kKnown = -(1 << 30);
+  static constexpr int32_t kKnown = -(1 << 30);                             // stays negative, whatever its corners add
 
   // State of a corner: how many of the two other points are known, and whether the point across their edge is.
   static constexpr uint32_t kBoth = 2, kAcross = 4;

@@ -14,7 +14,7 @@ double exp2_linear(int32_t x) {
   return std::bit_cast<double>(static_cast<uint64_t>(std::clamp(x + 1023 * kLogOne, kLogOne, 2046 * kLogOne)) << 42);
 }
 
-/// Rounds to the nearest integer, up in the middle. Very large values become 0.
+/// Rounds to the nearest integer, halves up. Returns 0 from 2^62 on.
 int64_t round_steps(double x) {
   if (!(std::abs(x) < 0x1p62)) return 0;
   const double shifted = x + 0.5;
@@ -22,7 +22,7 @@ int64_t round_steps(double x) {
   return whole - (static_cast<double>(whole) > shifted ? 1 : 0);
 }
 
-/// Class of an expected square error.
+/// Level of an expected square error, 0..39.
 uint32_t level(int32_t log) { return static_cast<uint32_t>(std::clamp((log >> 10) + 4, 0, 39)); }
 
 /// Bit width of a length in steps, at most `most`.
@@ -36,7 +36,7 @@ uint64_t bits_of(int64_t value) { return static_cast<uint64_t>(value < 0 ? ~valu
 constexpr std::array<double, 6> kAcrossLimits{-0.09, -0.0025, 0.0025, 0.09, 0.36, 0.64};
 constexpr std::array<double, 6> kBetweenLimits{-0.64, -0.36, -0.16, -0.04, 0.01, 0.25};
 
-/// Terms of a linear estimate to start from, per feature: expected widths grow with each of these features.
+/// Per feature, how much its initial terms grow from one value to the next.
 constexpr std::array<int32_t, 7> kFirstSlopes{0, 100, 40, 20, 0, 0, 0};
 
 } // namespace
@@ -149,9 +149,9 @@ void PositionPredictor::predict_without_guess(const std::vector<PagePoint>& poin
     span_ = last_span_;
     for (uint32_t i = 0; i < order.corner_count(point); ++i) {
       const uint32_t corner = order.corner(point, i).corner;
-      const PagePoint &p = points[triangles.points[PageTriangles::next(corner)]],
-                      &q = points[triangles.points[PageTriangles::previous(corner)]];
-      if (p.known || q.known) origin_ = p.known ? p.position : q.position;
+      const uint32_t p = triangles.points[PageTriangles::next(corner)],
+                     q = triangles.points[PageTriangles::previous(corner)];
+      if (order.known(p) || order.known(q)) origin_ = points[order.known(p) ? p : q].position;
     }
   }
   set_prediction(place);

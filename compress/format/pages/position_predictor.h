@@ -63,7 +63,7 @@ private:
     uint32_t cls;     ///< class of guesses with common errors
   };
 
-  /// A corner of the point whose triangle is known otherwise.
+  /// A corner of the point; the other two points of its triangle are known.
   struct KnownCorner {
     uint32_t p, q;    ///< the next and the previous point
     DVec3 to_p, to_q; ///< from the origin

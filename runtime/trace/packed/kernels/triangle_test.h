@@ -290,8 +290,8 @@ inline typename Lanes::F height_along(Relative relative, Normal normal) {
                     Lanes::fma(relative(1, 0), normal(1), Lanes::mul(relative(2, 0), normal(2))));
 }
 
-/// Returns what the origin's rounding error takes from height_along(). For nearest hits it is taken into account: along
-/// a grazing ray it is magnified many times.
+/// Returns the part of height_along() that comes from rounding the origin. Nearest hits subtract it, because grazing
+/// rays magnify it many times.
 template <typename Lanes, typename Rest, typename Normal>
 inline typename Lanes::F residual_along(Rest rest, Normal normal) {
   return Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2))));

@@ -51,8 +51,8 @@ public:
     if constexpr (!kAny) unit_.one_origin = start_at_one_place(unit_, count);
   }
 
-  /// Makes kGroup rays that follow each other the current group and traces them. Returns false, and traces nothing, if
-  /// they are no camera rays of one octant.
+  /// Makes kGroup rays that follow each other the current group and traces them. Returns false, and traces nothing,
+  /// unless they are camera rays of one octant.
   /// @param first index of the first ray
   bool trace_run(uint32_t first) {
     const KernelRay& a = rays_[first];
