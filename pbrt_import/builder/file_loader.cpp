@@ -9,9 +9,9 @@
 #include <tbb/parallel_for.h>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/large_pages.h"
 #include "pbrt_import/files/ply.h"
 #include "pbrt_import/text/input_file.h"
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/text/tokenizer.h"
 

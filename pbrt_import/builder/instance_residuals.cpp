@@ -4,7 +4,7 @@
 #include <array>
 #include <bit>
 
-#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/base/large_pages.h"
 
 namespace packtrace {
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pbrt_import/base/large_pages.h"
 #include "pbrt_import/builder/file_loader.h"
 #include "pbrt_import/builder/instance_residuals.h"
 #include "pbrt_import/builder/mesh_queue.h"
@@ -20,7 +21,6 @@
 #include "pbrt_import/language/parser.h"
 #include "pbrt_import/language/texture_graph.h"
 #include "pbrt_import/language/transforms.h"
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/text/reporter.h"
 
 namespace packtrace {

@@ -4,9 +4,9 @@
 #include <bit>
 
 #include "pbrt_import/base/file_error.h"
+#include "pbrt_import/base/large_pages.h"
 #include "pbrt_import/builder/scene_builder.h"
 #include "pbrt_import/scene/flattening.h"
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {

@@ -6,13 +6,13 @@
 #include <charconv>
 #include <cstdlib>
 
+#include "pbrt_import/base/large_pages.h"
 #include "pbrt_import/builder/outer_sides.h"
 #include "pbrt_import/builder/scene_pruning.h"
 #include "pbrt_import/builder/shape_builder.h"
 #include "pbrt_import/language/transforms.h"
 #include "pbrt_import/scene/far_world.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/text/tokenizer.h"
 

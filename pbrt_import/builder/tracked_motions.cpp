@@ -2,9 +2,9 @@
 
 #include <utility>
 
+#include "pbrt_import/base/large_pages.h"
 #include "pbrt_import/builder/scene_pruning.h"
 #include "pbrt_import/scene/separate_motion.h"
-#include "pbrt_import/text/large_pages.h"
 
 namespace packtrace {
 

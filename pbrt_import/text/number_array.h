@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "pbrt_import/base/large_pages.h"
 #include "pbrt_import/scene/math.h"
-#include "pbrt_import/text/large_pages.h"
 
 namespace packtrace {
 

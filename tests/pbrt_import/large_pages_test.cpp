@@ -1,4 +1,4 @@
-#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/base/large_pages.h"
 
 #include <memory>
 #include <string>

@@ -5,6 +5,7 @@
 
 #include "compress/format/deformation/deformation_view.h"
 #include "compress/format/file/mapped_file.h"
+#include "pbrt_import/base/large_pages.h"
 
 namespace packtrace {
 namespace {
@@ -42,7 +43,9 @@ BakedFile BakedFile::expand(std::span<const std::byte> bytes, const std::string&
 
 BakedFile BakedFile::from_bytes(std::span<const std::byte> bytes, const std::string& name) {
   if (is_paged_file(bytes)) return expand(bytes, name);
-  std::vector<std::byte> owned(bytes.begin(), bytes.end());
+  std::vector<std::byte> owned;
+  reserve_large(owned, bytes.size());
+  owned.assign(bytes.begin(), bytes.end());
   const std::span<const std::byte> copy(owned);
   return BakedFile(nullptr, std::move(owned), copy, resident_form(copy), name);
 }

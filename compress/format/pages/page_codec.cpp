@@ -17,6 +17,7 @@
 #include "compress/format/pages/page_decoder.h"
 #include "compress/format/trees/tree_topology.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/large_pages.h"
 
 namespace packtrace {
 namespace {
@@ -36,6 +37,7 @@ public:
     check_header();
     read_table();
     compute_layout();
+    reserve_large(resident_, static_cast<size_t>(header_.resident_bytes));
     resident_.resize(static_cast<size_t>(header_.resident_bytes));
     unzip(head_, 0, header_.head_bytes, "head");
     unzip(tail_, tail_begin_, header_.tail_bytes, "tail");
