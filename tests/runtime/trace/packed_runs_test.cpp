@@ -44,8 +44,11 @@ size_t trace_alone_too(const PackedTracer& tracer, const std::vector<Ray>& rays)
   return hits;
 }
 
+/// The rays of a cone, of which some end early. All begin at their origin, as the rays of a run must share tnear.
 size_t trace_cone(const PackedTracer& tracer, const DVec3& from, const DVec3& towards, double width) {
-  return trace_alone_too(tracer, cone(tracer.space(), from, towards, width));
+  std::vector<Ray> rays = cone(tracer.space(), from, towards, width);
+  for (Ray& ray : rays) ray.tnear = 0.0f;
+  return trace_alone_too(tracer, rays);
 }
 
 /// Runs of camera rays are culled by bounds of all directions before they are transformed, and coincident instances
@@ -118,17 +121,20 @@ Scene graded_scene() {
 struct RunCase {
   const char* name;
   Scene (*scene)();
-  void (*change)(Ray& ray, size_t number); ///< changes a ray; `number`: within its run
+  /// Changes a ray.
+  /// @param number within its run
+  /// @param unit t of a distance of 1 in the scene
+  void (*change)(Ray& ray, size_t number, float unit);
   double away = 5.0, width = 0.4;
   bool graded = false;
 };
 
-void keep(Ray&, size_t) {}
+void keep(Ray&, size_t, float) {}
 
 void scale(Ray& ray, float factor) { ray.direction = ray.direction * factor; }
 
 template <int kAxis, size_t kValue>
-void set_component(Ray& ray, size_t number) {
+void set_component(Ray& ray, size_t number, float) {
   constexpr float kValues[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -0.0f};
   if (number == kUnread) ray.direction[kAxis] = std::copysign(kValues[kValue], ray.direction[kAxis]);
 }
@@ -137,12 +143,12 @@ const RunCase kRunCases[] = {
     {"Plain", plain_scene, keep},
     {"Masked", masked_scene, keep},
     {"Graded", graded_scene, keep, 5.0, 0.4, true},
-    {"DirectionsOf2To70", plain_scene, [](Ray& ray, size_t) { scale(ray, 0x1p70f); }},
-    {"DirectionsOf2ToMinus70", plain_scene, [](Ray& ray, size_t) { scale(ray, 0x1p-70f); }},
+    {"DirectionsOf2To70", plain_scene, [](Ray& ray, size_t, float) { scale(ray, 0x1p70f); }},
+    {"DirectionsOf2ToMinus70", plain_scene, [](Ray& ray, size_t, float) { scale(ray, 0x1p-70f); }},
     {"MovedOrigins", plain_scene, keep, 500.0, 0.003},
-    {"ShortDirectionsFromFarAway", plain_scene, [](Ray& ray, size_t) { scale(ray, 0x1p-59f); }, 0x1p39, 0x1p-39},
+    {"ShortDirectionsFromFarAway", plain_scene, [](Ray& ray, size_t, float) { scale(ray, 0x1p-59f); }, 0x1p39, 0x1p-39},
     {"OneShortDirection", plain_scene,
-     [](Ray& ray, size_t number) {
+     [](Ray& ray, size_t number, float) {
        if (number == kUnread) scale(ray, 0x1p-90f);
      }},
     {"NanAlongX", plain_scene, set_component<0, 0>},
@@ -151,15 +157,27 @@ const RunCase kRunCases[] = {
     {"InfiniteAlongZ", plain_scene, set_component<2, 1>},
     {"ZeroAlongX", plain_scene, set_component<0, 2>},
     {"MinusZeroAlongX", plain_scene,
-     [](Ray& ray, size_t number) {
+     [](Ray& ray, size_t number, float) {
        if (number == kUnread) ray.direction.x = -0.0f;
      }},
+    {"OneOtherOrigin", plain_scene,
+     [](Ray& ray, size_t number, float unit) {
+       if (number == kUnread) ray.origin.x += 0.5f * unit;
+     }},
+    // 4.5 is inside the sphere.
+    {"OneOtherBegin", plain_scene,
+     [](Ray& ray, size_t number, float unit) {
+       if (number == kUnread) ray.tnear = 4.5f * unit;
+     }},
+    {"CommonBeginInsideTheSphere", plain_scene, [](Ray& ray, size_t, float unit) { ray.tnear = 4.5f * unit; }},
+    {"EndsOfTheirOwn", plain_scene,
+     [](Ray& ray, size_t number, float unit) { ray.tfar = (number % 3 == 0 ? 4.2f : 6.5f) * unit; }},
     {"EmptyRange", plain_scene,
-     [](Ray& ray, size_t number) {
+     [](Ray& ray, size_t number, float) {
        if (number == kUnread) ray.tnear = 2.0f, ray.tfar = 1.0f;
      }},
     {"RangeOfNan", plain_scene,
-     [](Ray& ray, size_t number) {
+     [](Ray& ray, size_t number, float) {
        if (number == kUnread) ray.tfar = std::numeric_limits<float>::quiet_NaN();
      }},
 };
@@ -179,7 +197,7 @@ TEST_P(PackedRunsOf, FindWhatTheirRaysFind) {
     std::vector<Ray> rays = cone(tracer.space(), {0, 1, -of.away}, {0, 0, 1}, of.width);
     for (size_t i = 0; i < rays.size(); ++i) {
       rays[i].tnear = 0.0f, rays[i].tfar = std::numeric_limits<float>::infinity();
-      of.change(rays[i], i % kRun);
+      of.change(rays[i], i % kRun, static_cast<float>(tracer.space().scale()));
     }
     const size_t hits = trace_alone_too(tracer, rays), traced = test::sanitized() ? rays.size() / 13 : rays.size();
     EXPECT_GT(hits, traced / 10);

@@ -53,20 +53,50 @@ struct alignas(64) Beam {
 
 constexpr uint32_t kMinBeamRays = 16; ///< minimum number of rays for which a beam is worth its setup
 
+/// Limits of Beam::plain.
+constexpr double kLeastPlainScale = 0x1p-60, kMostPlainScale = 0x1p60;
+
 /// Sets the scales of a beam.
 inline void set_scales(const RayGroup& group, Beam& beam) {
-  constexpr double kLeast = 0x1p-60, kMost = 0x1p60;
   uint32_t plain = (1u << kDoubleLanes) - 1;
   for (uint32_t at = 0; at < kGroup; at += kDoubleLanes) {
     Doubles begin, scale;
     read_block(begin, &group.t_begin[at]);
     read_block(scale, &group.t_scale[at]);
-    plain &= lanes_between(kLeast, begin == 0.0 ? scale : Doubles{}, kMost);
+    plain &= lanes_between(kLeastPlainScale, begin == 0.0 ? scale : Doubles{}, kMostPlainScale);
     write_block(&beam.unit_scale[at], to_floats(scale));
     write_block(&beam.grid_scale[at],
                 to_floats(reinterpret_cast<Doubles>((int64_t{2046} << 52) - reinterpret_cast<Longs>(scale))));
   }
   beam.plain = plain == (1u << kDoubleLanes) - 1;
+}
+
+/// Sets origin, inverse and limits of a beam.
+/// @param first a ray of the beam; rays of the group that are not in the beam have its inverses and an empty range of t
+inline void set_bounds(const RayGroup& group, float pad_coordinate, uint32_t first, Beam& beam) {
+  float reach = pad_coordinate;
+  for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    Floats least = Floats{} + group.inverse[axis][first], most = least;
+    for (uint32_t at = 0; at < kGroup; at += kBlock) {
+      Floats inverse;
+      read_block(inverse, &group.inverse[axis][at]);
+      keep_larger(most, inverse);
+      least = inverse < least ? inverse : least;
+    }
+    beam.inverse[axis][0] = -largest_lane(-least), beam.inverse[axis][1] = largest_lane(most);
+    // Outwards: near planes move towards the rays' origin, far planes away from it.
+    const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach;
+    beam.origin[axis][0] = group.origin[axis][first] + pad, beam.origin[axis][1] = -group.origin[axis][first] + pad;
+  }
+  Floats least, begin;
+  read_block(least, &group.begin[0]);
+  for (uint32_t at = kBlock; at < kGroup; at += kBlock) {
+    read_block(begin, &group.begin[at]);
+    least = begin < least ? begin : least;
+  }
+  beam.limits[0] = -largest_lane(-least);
+  beam.update_limits(group);
 }
 
 /// Makes a beam of all rays of a group. Returns false if they have no common origin or octant, or are too few. Origins
@@ -98,29 +128,7 @@ inline bool make_beam(RayGroup& group, float pad_coordinate, uint64_t rays, Beam
     group.end[i] = -__builtin_inff();
     group.t_begin[i] = group.t_begin[first], group.t_scale[i] = group.t_scale[first];
   }
-  float reach = pad_coordinate;
-  for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    Floats least = Floats{} + group.inverse[axis][first], most = least;
-    for (uint32_t at = 0; at < kGroup; at += kBlock) {
-      Floats inverse;
-      read_block(inverse, &group.inverse[axis][at]);
-      keep_larger(most, inverse);
-      least = inverse < least ? inverse : least;
-    }
-    beam.inverse[axis][0] = -largest_lane(-least), beam.inverse[axis][1] = largest_lane(most);
-    // Outwards: near planes move towards the rays' origin, far planes away from it.
-    const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach;
-    beam.origin[axis][0] = group.origin[axis][first] + pad, beam.origin[axis][1] = -group.origin[axis][first] + pad;
-  }
-  Floats least, begin;
-  read_block(least, &group.begin[0]);
-  for (uint32_t at = kBlock; at < kGroup; at += kBlock) {
-    read_block(begin, &group.begin[at]);
-    least = begin < least ? begin : least;
-  }
-  beam.limits[0] = -largest_lane(-least);
-  beam.update_limits(group);
+  set_bounds(group, pad_coordinate, first, beam);
   set_scales(group, beam);
   return true;
 }

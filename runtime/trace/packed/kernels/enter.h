@@ -63,32 +63,30 @@ inline uint32_t approach(const TracePlacement& placement, double margin, uint32_
   return near;
 }
 
-/// Transforms half a block of rays into the grid. Returns the lanes of `wanted` that may hit something: their
-/// directions are nonzero, directions and origins are below 1e300 in magnitude, and origins far away have been moved to
-/// the tree's box.
+/// Returns one component of directions turned into the grid.
+/// @param m TracePlacement::grid_from_unit
 /// @tparam kAligned the grid's axes are those of unit space: the transform only scales and translates
 template <bool kAligned>
-[[gnu::always_inline]] inline uint32_t move_rays(const TracePlacement& placement, float max_coordinate,
-                                                 const UnitRays& from, uint32_t first, uint32_t wanted, GridRays& out) {
+[[gnu::always_inline]] inline Doubles turn(const double* m, uint32_t axis, const Doubles (&v)[3]) {
+  if constexpr (kAligned) return m[4 * axis] * v[axis];
+  return m[axis] * v[0] + m[3 + axis] * v[1] + m[6 + axis] * v[2];
+}
+
+[[gnu::always_inline]] inline void keep_larger_magnitude(Doubles& most, const Doubles& x) {
   constexpr int64_t kMagnitude = 0x7fffffffffffffff;
-  const auto keep_magnitude = [](Doubles& most, const Doubles& x) {
-    keep_larger(most, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(x) & kMagnitude));
-  };
-  const double* m = placement.grid_from_unit;
-  Doubles origin[3], direction[3], largest{}, away{};
+  keep_larger(most, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(x) & kMagnitude));
+}
+
+/// Turns the directions of half a block of rays into the grid and scales them so that their largest components are in
+/// [1, 2). Sets direction, power and scale of `out`. Returns the largest components before they were scaled.
+template <bool kAligned>
+[[gnu::always_inline]] inline Doubles move_directions(const TracePlacement& placement, const UnitRays& from,
+                                                      uint32_t first, GridRays& out) {
+  Doubles direction[3], largest{};
+  for (uint32_t axis = 0; axis < 3; ++axis) direction[axis] = read_doubles(&from.direction[axis][first]);
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    origin[axis] = read_doubles(&from.origin[axis][first]);
-    direction[axis] = read_doubles(&from.direction[axis][first]);
-  }
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    const auto turned = [&](const Doubles(&v)[3]) {
-      if constexpr (kAligned) return m[4 * axis] * v[axis];
-      return m[axis] * v[0] + m[3 + axis] * v[1] + m[6 + axis] * v[2];
-    };
-    out.direction[axis] = turned(direction);
-    out.origin[axis] = turned(origin) + m[9 + axis];
-    keep_magnitude(largest, out.direction[axis]);
-    keep_magnitude(away, out.origin[axis]);
+    out.direction[axis] = turn<kAligned>(placement.grid_from_unit, axis, direction);
+    keep_larger_magnitude(largest, out.direction[axis]);
   }
   constexpr int64_t kExponent = int64_t{2047} << 52, kMin = int64_t{523} << 52, kMax = int64_t{1523} << 52;
   const Doubles least = Doubles{} + __builtin_bit_cast(double, kMin),
@@ -100,6 +98,22 @@ template <bool kAligned>
   out.power = power;
   out.scale = reinterpret_cast<Doubles>((int64_t{2046} << 52) - reinterpret_cast<Longs>(power));
   for (Doubles& component : out.direction) component = component * out.scale;
+  return largest;
+}
+
+/// Transforms half a block of rays into the grid. Returns the lanes of `wanted` that may hit something: their
+/// directions are nonzero, directions and origins are below 1e300 in magnitude, and origins far away have been moved to
+/// the tree's box.
+template <bool kAligned>
+[[gnu::always_inline]] inline uint32_t move_rays(const TracePlacement& placement, float max_coordinate,
+                                                 const UnitRays& from, uint32_t first, uint32_t wanted, GridRays& out) {
+  Doubles origin[3], away{};
+  for (uint32_t axis = 0; axis < 3; ++axis) origin[axis] = read_doubles(&from.origin[axis][first]);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    out.origin[axis] = turn<kAligned>(placement.grid_from_unit, axis, origin) + placement.grid_from_unit[9 + axis];
+    keep_larger_magnitude(away, out.origin[axis]);
+  }
+  const Doubles largest = move_directions<kAligned>(placement, from, first, out);
   out.begin = Doubles{};
   const uint32_t usable = wanted & lanes_between(0.0, largest, 1e300) & lanes_between(-1.0, away, 1e300);
   const uint32_t far = usable & lanes_between(kFar * double{max_coordinate}, away, 1e300);

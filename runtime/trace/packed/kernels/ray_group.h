@@ -138,6 +138,9 @@ struct alignas(64) RayGroup : SideBySideRays {
   }
 };
 
+/// Returns the next smaller floats: tfar itself is excluded.
+inline Floats before_tfar(const Floats& tfar) { return reinterpret_cast<Floats>(reinterpret_cast<Ints>(tfar) - 1); }
+
 /// Reads a block of rays, starting at element `first` of `out`.
 /// @param numbers indices of the block's rays
 [[gnu::always_inline]] inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first,
@@ -154,8 +157,7 @@ struct alignas(64) RayGroup : SideBySideRays {
     write_block(&out.direction[axis][first], values[4 + axis]);
   }
   write_block(&out.tnear[first], values[3]);
-  // The next smaller float: tfar itself is excluded.
-  write_block(&out.tmax[first], reinterpret_cast<Floats>(reinterpret_cast<Ints>(values[7]) - 1));
+  write_block(&out.tmax[first], before_tfar(values[7]));
 }
 
 /// Whether the first `count` rays of a group have the same origin. take() fills the rest of the last block with copies.
@@ -170,39 +172,18 @@ inline bool start_at_one_place(const UnitRays& rays, uint32_t count) {
   return lane_bits(same) == kBlockLanes;
 }
 
-/// Whether all rays of a full group have directions of one octant and a range of t that is not empty.
-inline bool have_one_octant(const UnitRays& rays) {
-  Ints ranges = Ints{} - 1;
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    Ints forward = Ints{} - 1, backward = forward;
-    for (uint32_t first = 0; first < kGroup; first += kBlock) {
-      Ints direction;
-      read_block(direction, &rays.direction[axis][first]);
-      forward &= direction >= 0, backward &= direction < 0;
-    }
-    if (lane_bits(forward) != kBlockLanes && lane_bits(backward) != kBlockLanes) return false;
-  }
-  for (uint32_t first = 0; first < kGroup; first += kBlock) {
-    Floats begin, end;
-    read_block(begin, &rays.tnear[first]);
-    read_block(end, &rays.tmax[first]);
-    ranges &= (begin >= 0.0f) & (end >= begin);
-  }
-  return lane_bits(ranges) == kBlockLanes;
-}
-
 /// A block of rays in a tree's grid, the input of set_boxes() and set_shears().
 struct RayBlock {
   Floats origin[3], direction[3], begin, end;
-  Floats rest[3]; ///< RayGroup::rest; set for nearest hits and triangle tests only
+  Floats rest[3];    ///< RayGroup::rest; set for nearest hits and triangle tests only
+  Floats inverse[3]; ///< RayGroup::inverse, set by set_boxes()
 };
 
 /// Writes the data for box tests of a block, starting at element `first` of the group.
 /// @param pad_coordinate minimum of kBoxPad's M
 /// @tparam kForBeam whether `limits` and `bias` are left to fill_records()
 template <bool kForBeam, typename Group>
-[[gnu::always_inline]] inline void set_boxes(const RayBlock& block, float pad_coordinate, uint32_t first,
-                                             Group& group) {
+[[gnu::always_inline]] inline void set_boxes(RayBlock& block, float pad_coordinate, uint32_t first, Group& group) {
   Floats reach = Floats{} + pad_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) keep_larger(reach, magnitude(block.origin[axis]));
   if constexpr (!kForBeam) write_pairs(&group.limits[first], block.begin, -block.end);
@@ -216,6 +197,7 @@ template <bool kForBeam, typename Group>
     const Ints sign = reinterpret_cast<Ints>(d) & static_cast<int32_t>(0x80000000u);
     const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
     const Floats back = block.origin[axis] * inverse, away = kBoxPad * reach * over;
+    block.inverse[axis] = inverse;
     write_block(&group.inverse[axis][first], inverse);
     if constexpr (!kForBeam) write_pairs(&group.bias[axis][first], -back - away, back - away);
     if constexpr (Group::kSideBySide) {
@@ -227,6 +209,7 @@ template <bool kForBeam, typename Group>
 }
 
 /// Writes the data for triangle tests of a block, starting at element `first` of the group.
+/// @param block after set_boxes()
 /// @tparam kNearest whether block.rest is set
 /// @tparam kForBeam whether `tests` and `rests` are left to fill_records()
 template <bool kNearest, bool kForBeam>
@@ -250,7 +233,8 @@ inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   Floats rows[8];
   along_k(block.direction, rows);
   const Floats along = rows[2];
-  rows[4] = rows[0] / along, rows[5] = rows[1] / along, rows[6] = 1.0f / along;
+  rows[4] = rows[0] / along, rows[5] = rows[1] / along;
+  rows[6] = by_z ? block.inverse[2] : by_y ? block.inverse[1] : block.inverse[0]; // 1 / along
   for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.shear[axis][first], rows[4 + axis]);
   if constexpr (kNearest)
     for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.rest[axis][first], block.rest[axis]);

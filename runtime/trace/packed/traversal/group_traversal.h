@@ -1,7 +1,7 @@
 #pragma once
 
 #include "runtime/trace/packed/kernels/beam.h"
-#include "runtime/trace/packed/kernels/enter.h"
+#include "runtime/trace/packed/kernels/enter_run.h"
 #include "runtime/trace/packed/kernels/group_bounds.h"
 #include "runtime/trace/packed/kernels/node_children.h"
 #include "runtime/trace/packed/kernels/unit_beam.h"
@@ -64,12 +64,9 @@ public:
             __builtin_signbit(b.direction[axis]) != __builtin_signbit(a.direction[axis]))
           return false;
     }
-    for (uint32_t i = 0; i < kGroup; ++i) run_[i] = first + i;
-    for (uint32_t i = 0; i < kGroup; i += 2)
-      __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<uintptr_t>(&a) + (kGroup + i) * sizeof a));
-    take(run_, kGroup);
-    if (!unit_.one_origin || !have_one_octant(unit_)) return false;
-    is_run_ = true;
+    if (!read_run(&a, hits_ + first, unit_)) return false;
+    unit_.one_origin = is_run_ = true;
+    alive_ = ~uint64_t{0};
     run_hits_.clear();
     has_beam_ = make_unit_beam(unit_, scene_.top_max_coordinate, beam_);
     trace();
@@ -234,11 +231,16 @@ private:
     const float pad_coordinate = (graded_ ? kMinTopPad : 1.0f) * tree.max_coordinate;
     Beam beam;
     if (!kAny && unit_.one_origin && scene_.search_tree == nullptr) {
-      rays = enter<true, true>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
-      if (make_beam(group, pad_coordinate, rays, beam))
+      if (is_run_ && rays == ~uint64_t{0} &&
+          enter_run(place, tree.max_coordinate, pad_coordinate, unit_, group, beam)) {
         group.beam = &beam;
-      else
-        fill_records(group);
+      } else {
+        rays = enter<true, true>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
+        if (make_beam(group, pad_coordinate, rays, beam))
+          group.beam = &beam;
+        else
+          fill_records(group);
+      }
     } else {
       rays = enter<!kAny>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
     }
@@ -317,8 +319,7 @@ private:
   }
 
   const KernelRay* const rays_;
-  uint32_t run_[kGroup]; ///< numbers of the rays of trace_run()
-  UnitBeam beam_;        ///< of the current run, if has_beam_
+  UnitBeam beam_; ///< of the current run, if has_beam_
   bool has_beam_ = false;
   bool graded_ = false; ///< TraceTree::graded of the current tree
 };
