@@ -53,20 +53,30 @@ struct PageTriangles {
   std::vector<uint32_t> points; ///< point of each corner
   std::vector<uint32_t> across; ///< corner that faces the same edge from the other side, or kNoPageCorner
 
-  static uint32_t next(uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
-  static uint32_t previous(uint32_t corner) { return corner % 3 == 0 ? corner + 2 : corner - 1; }
-  uint32_t count() const { return static_cast<uint32_t>(points.size()); }
+  static constexpr uint32_t next(uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+  static constexpr uint32_t previous(uint32_t corner) { return corner % 3 == 0 ? corner + 2 : corner - 1; }
+  uint32_t count() const { return count_; }
 
-  void clear() { points.clear(), across.clear(); }
+  void clear() { count_ = 0; }
+
+  /// Adds three corners, without others across. Returns the first.
+  uint32_t add(const std::array<uint32_t, 3>& corners) {
+    const uint32_t first = count_;
+    count_ += 3;
+    if (count_ > points.size()) points.resize(2 * size_t{count_}), across.resize(2 * size_t{count_});
+    for (uint32_t i = 0; i < 3; ++i) points[first + i] = corners[i], across[first + i] = kNoPageCorner;
+    return first;
+  }
+
+private:
+  uint32_t count_ = 0; // at most the vectors' sizes
 };
 
 /// Adds a triangle to the page and to its border: edges close edges of the border or become part of it.
 /// @param corners indices of its points
 inline void add_triangle(std::vector<PagePoint>& points, PageTriangles& triangles,
                          const std::array<uint32_t, 3>& corners) {
-  const uint32_t first = triangles.count();
-  triangles.points.insert(triangles.points.end(), corners.begin(), corners.end());
-  triangles.across.insert(triangles.across.end(), 3, kNoPageCorner);
+  const uint32_t first = triangles.add(corners);
   for (uint32_t i = 0; i < 3; ++i) {
     const uint32_t from = corners[i], to = corners[(i + 1) % 3], facing = first + (i + 2) % 3;
     PagePoint &a = points[from], &b = points[to];

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
+#include <cstring>
 
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/pages/page_border.h"
@@ -26,30 +28,22 @@ public:
   void begin(const PageTriangles& triangles, uint32_t points, uint32_t first_point, uint32_t first_corner) {
     first_corner_ = first_corner, first_point_ = first_point, count_ = points - first_point;
     const uint32_t corners = triangles.count() - first_corner;
-    const uint32_t *corner_points = triangles.points.data() + first_corner,
-                   *across = triangles.across.data() + first_corner;
-    ends_.fill(0);
-    for (uint32_t c = 0; c < corners; ++c) {
-      const uint32_t point = corner_points[c];
-      points_[c] = static_cast<uint16_t>(point < first_point ? kOld : point - first_point);
-      ++ends_[points_[c]];
-      across_[c] = static_cast<uint16_t>(across[c] - first_corner < corners ? across[c] - first_corner : kNoCorner);
-    }
+    copy_corners(triangles, corners);
     uint16_t sum = 0;
     for (uint32_t i = 0; i < count_; ++i) {
       begins_[i] = sum;
       sum = static_cast<uint16_t>(sum + ends_[i]);
       ends_[i] = begins_[i];
-      keys_[i] = static_cast<int32_t>(kMaxClusterVertices - i);
+      keys_[i] = kFirstKey + static_cast<int32_t>(kMaxClusterVertices - i);
     }
-    ends_[kOld] = sum, keys_[kOld] = 0;
-    for (uint32_t c = 0; c < corners; ++c) {
-      const bool old_across =
-          across_[c] != kNoCorner ? points_[across_[c]] == kOld : across[c] != kNoPageCorner; // or of an older cluster
-      const uint32_t old = (points_[next_of(c)] == kOld ? 1u : 0u) + (points_[previous_of(c)] == kOld ? 1u : 0u);
-      states_[c] = static_cast<uint8_t>(old + (old_across ? kAcross : 0));
-      keys_[points_[c]] += kShares[states_[c]];
-      corners_[ends_[points_[c]]++] = static_cast<uint16_t>(c);
+    std::fill_n(keys_.begin() + count_, kKeysPerStep, 0);
+    std::fill_n(keys_.begin() + kOld, kNobody + 1 - kOld, 0);
+    for (uint32_t i = 0; i < 3; ++i) ends_[kOld + i] = sum;
+    for (uint32_t c = 0; c < corners; c += 3) {
+      const std::array<uint32_t, 3> old{is_old(c), is_old(c + 1), is_old(c + 2)};
+      add_corner(c, old[1] + old[2]);
+      add_corner(c + 1, old[2] + old[0]);
+      add_corner(c + 2, old[0] + old[1]);
     }
   }
 
@@ -57,10 +51,17 @@ public:
 
   /// Returns the point to code next: of those of the highest rank that are not known, the first.
   uint32_t next() const {
-    int32_t best = 0;
-    for (uint32_t i = 0; i < count_; ++i) best = std::max(best, keys_[i]);
+    // The maximum is that of floats, whose order is that of their bits. Known points are negative.
+    std::array<Floats, kKeysPerStep / 4> best{}, some;
+    for (uint32_t i = 0; i < count_; i += kKeysPerStep) {
+      std::memcpy(&some, keys_.data() + i, sizeof some);
+      for (size_t k = 0; k < best.size(); ++k) best[k] = larger(some[k], best[k]);
+    }
+    Floats most = larger(larger(best[0], best[1]), larger(best[2], best[3]));
+    most = larger(most, __builtin_shufflevector(most, most, 2, 3, 0, 1));
+    most = larger(most, __builtin_shufflevector(most, most, 1, 0, 3, 2));
     // The remainder is kMaxClusterVertices - 1 - i.
-    return first_point_ + kMaxClusterVertices - 1 - (static_cast<uint32_t>(best) - 1) % kMaxClusterVertices;
+    return first_point_ + kMaxClusterVertices - 1 - (std::bit_cast<uint32_t>(most[0]) - 1) % kMaxClusterVertices;
   }
 
   /// Whether a point is not new, or has become known.
@@ -83,15 +84,20 @@ public:
     keys_[i] = kKnown;
     for (uint32_t at = begins_[i]; at < ends_[i]; ++at) {
       const uint32_t c = corners_[at];
-      advance(next_of(c), 1), advance(previous_of(c), 1);
-      if (across_[c] != kNoCorner) advance(across_[c], kAcross);
+      advance(kNeighbours.next[c], 1), advance(kNeighbours.previous[c], 1), advance(across_[c], kAcross);
     }
   }
 
 private:
-  static constexpr uint32_t kMaxCorners = 3 * kMaxClusterTriangles;
-  static constexpr uint16_t kOld = kMaxClusterVertices, kNoCorner = 0xffff; // points and corners of other clusters
-  static constexpr int32_t kKnown = -(1 << 30);                             // stays negative, whatever its corners add
+  using Floats [[gnu::vector_size(16)]] = float;
+  static Floats larger(Floats a, Floats b) { return a > b ? a : b; }
+
+  static constexpr uint32_t kMaxCorners = 3 * kMaxClusterTriangles, kKeysPerStep = 16;
+  static constexpr uint32_t kOld = kMaxClusterVertices; // points of other clusters: kOld + their corner
+  static constexpr uint32_t kNobody = kOld + 3;
+  static constexpr uint32_t kOldCorner = kMaxCorners, kNoCorner = kMaxCorners + 1; // of other clusters; none
+  static constexpr int32_t kKnown = -(1 << 30); // stays negative, whatever its corners add
+  static constexpr int32_t kFirstKey = 1 << 23; // from here on, keys are the bits of normal floats
 
   // State of a corner: how many of the two other points are known, and whether the point across their edge is.
   static constexpr uint32_t kBoth = 2, kAcross = 4;
@@ -101,24 +107,57 @@ private:
     return std::array<int32_t, 8>{0, kRank, 16 * kRank, 0, 0, kRank, 256 * kRank, 0};
   }();
 
-  static uint32_t next_of(uint32_t c) { return c + kSteps[c % 3]; }
-  static uint32_t previous_of(uint32_t c) { return c + kSteps[3 + c % 3]; }
-  static constexpr std::array<uint32_t, 6> kSteps{1, 1, ~1u, 2, ~0u, ~0u}; // to the next and the previous corner
+  struct Neighbours {
+    std::array<uint16_t, kMaxCorners> next, previous;
+  };
+  static constexpr Neighbours kNeighbours = [] {
+    Neighbours neighbours{};
+    for (uint32_t c = 0; c < kMaxCorners; ++c) {
+      neighbours.next[c] = static_cast<uint16_t>(PageTriangles::next(c));
+      neighbours.previous[c] = static_cast<uint16_t>(PageTriangles::previous(c));
+    }
+    return neighbours;
+  }();
+
+  /// Copies the points of the cluster's corners and what lies across, as numbers within the cluster, and counts
+  /// corners.
+  void copy_corners(const PageTriangles& triangles, uint32_t corners) {
+    const uint32_t *points = triangles.points.data() + first_corner_, *across = triangles.across.data() + first_corner_;
+    ends_.fill(0);
+    // Numbers of older points wrap. These have three places, because counts of one place wait for each other.
+    for (uint32_t t = 0; t < corners; t += 3)
+      for (uint32_t i = 0; i < 3; ++i) {
+        const uint32_t c = t + i, own = across[c] - first_corner_;
+        points_[c] = static_cast<uint16_t>(std::min(points[c] - first_point_, kOld + i));
+        ++ends_[points_[c]];
+        across_[c] = static_cast<uint16_t>(own < corners ? own : across[c] == kNoPageCorner ? kNoCorner : kOldCorner);
+      }
+    points_[kOldCorner] = kOld, points_[kNoCorner] = kNobody;
+  }
+
+  uint32_t is_old(uint32_t c) const { return points_[c] >= kOld && points_[c] < kNobody ? 1 : 0; }
+
+  void add_corner(uint32_t c, uint32_t old) {
+    const uint32_t state = old + is_old(across_[c]) * kAcross, point = points_[c];
+    states_[c] = static_cast<uint8_t>(state);
+    keys_[point] += kShares[state];
+    corners_[ends_[point]++] = static_cast<uint16_t>(c);
+  }
 
   void advance(uint32_t corner, uint32_t by) {
-    const uint32_t before = states_[corner], now = before + by;
+    const uint32_t before = states_[corner], now = (before + by) % 8; // the remainder matters only where there is none
     keys_[points_[corner]] += kShares[now] - kShares[before];
     states_[corner] = static_cast<uint8_t>(now);
   }
 
   uint32_t first_corner_ = 0, first_point_ = 0, count_ = 0;
-  std::array<uint16_t, kMaxClusterVertices + 1> begins_{}, ends_{}; // of a new point's corners in corners_
-  /// kMaxClusterVertices x rank + kMaxClusterVertices - i for new point i, so the largest key is that of the next
-  /// point.
-  std::array<int32_t, kMaxClusterVertices + 1> keys_{};
-  std::array<uint16_t, kMaxCorners> points_{}, across_{}; // per corner of the cluster
-  std::array<uint8_t, kMaxCorners> states_{};
-  std::array<uint16_t, kMaxCorners> corners_{}; // by new point
+  std::array<uint16_t, kNobody + 1> begins_{}, ends_{}; // of a new point's corners in corners_
+  /// kMaxClusterVertices x rank + kMaxClusterVertices - i + kFirstKey for new point i, so the largest key is that of
+  /// the next point.
+  alignas(16) std::array<int32_t, kNobody + 1 + kKeysPerStep> keys_{};
+  std::array<uint16_t, kMaxCorners + 2> points_{}, across_{}; // per corner of the cluster
+  std::array<uint8_t, kMaxCorners + 2> states_{};
+  std::array<uint16_t, 2 * kMaxCorners> corners_{}; // by new point, then of older points
 };
 
 } // namespace packtrace
