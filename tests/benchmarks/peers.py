@@ -141,7 +141,7 @@ def ray_tables(results):
             theirs = by_call[peer, call] if call else fastest[peer]
             ratios.append(fastest["packed"] / theirs)
             cells.append(f"{ratios[-1]:.2f}")
-        return [title, goal, *cells, f"{statistics.mean(ratios):.3f}"]
+        return [title, goal, *cells, f"{statistics.mean(ratios):.3f}" if ratios else "-"]
 
     print("Rays of `packed` per second over those of Embree, one thread.\n")
     print_table(["rays, Embree's tree and call", "goal", *(s["name"] for s in scenes), "mean"], [
