@@ -217,6 +217,33 @@ double hit_distance(const Probe& probe, const std::array<DVec3, 3>& t, DVec3 nor
   return glm::dot(a, normal) / facing;
 }
 
+/// A box around all points of another one that a map moves and floats round.
+Bounds moved_box(const DAffine& to_from, const Bounds& box) {
+  constexpr double kRounding = 1e-6, kLargest = 1e38; // above the rounding of floats; below their limit
+  const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  const DVec3 terms =
+      glm::abs(to_from[0]) * far.x + glm::abs(to_from[1]) * far.y + glm::abs(to_from[2]) * far.z + glm::abs(to_from[3]);
+  if (!(terms.x < kLargest && terms.y < kLargest && terms.z < kLargest))
+    return {DVec3(-std::numeric_limits<double>::infinity()), DVec3(std::numeric_limits<double>::infinity())};
+  Bounds moved = transform_bounds(to_from, box);
+  moved.lo -= kRounding * terms, moved.hi += kRounding * terms;
+  return moved;
+}
+
+/// A box around some triangles of a placed mesh in world space, in fewer steps than their exact one.
+Bounds box_around(const PlacedPart& placed, const Mesh& mesh, std::span<const Triangle> triangles) {
+  Vec3 lo(std::numeric_limits<float>::infinity()), hi(-lo);
+  for (const Triangle& t : triangles)
+    for (int corner = 0; corner < 3; ++corner) {
+      const Vec3& p = mesh.positions[t[corner]];
+      lo = glm::min(lo, p), hi = glm::max(hi, p);
+    }
+  Bounds box{DVec3(lo), DVec3(hi)};
+  if (placed.moved) box = moved_box(placed.part->geometry_from_mesh, box);
+  if (placed.placed) box = moved_box(placed.world_from_geometry, box);
+  return box;
+}
+
 class GapMeasurer {
 public:
   GapMeasurer(const PlacedParts& parts, const VisiblePoints& points)
@@ -287,6 +314,9 @@ private:
       const size_t count = mesh.triangles.size();
       tbb::parallel_for(size_t{0}, (count + kBlockTriangles - 1) / kBlockTriangles, [&](size_t block) {
         const size_t begin = block * kBlockTriangles, end = std::min(begin + kBlockTriangles, count);
+        const std::span<const Triangle> of_mesh = std::span(mesh.triangles).subspan(begin, end - begin);
+        const ProbeTree::Starts near_block = tree.narrowed(tree.all(), box_around(placed, mesh, of_mesh));
+        if (near_block.count == 0) return; // most blocks
         std::array<std::array<DVec3, 3>, kBlockTriangles> triangles;
         std::array<Bounds, kBlockTriangles / kGroupTriangles> boxes; // per group
         Bounds box;
@@ -297,7 +327,7 @@ private:
             boxes[(i - begin) / kGroupTriangles].extend(p);
           }
         for (const Bounds& group : boxes) box.extend(group);
-        const ProbeTree::Starts of_block = tree.narrowed(tree.all(), box);
+        const ProbeTree::Starts of_block = tree.narrowed(near_block, box);
         for (size_t first = begin; of_block.count > 0 && first < end; first += kGroupTriangles) {
           const ProbeTree::Starts starts = tree.narrowed(of_block, boxes[(first - begin) / kGroupTriangles]);
           for (size_t i = first; starts.count > 0 && i < std::min(first + kGroupTriangles, end); ++i)
