@@ -28,6 +28,12 @@ struct ImagePoint {
 
 using ImageTriangle = std::array<ImagePoint, 3>;
 
+/// The smallest and the largest of three values, without branches; all are finite or the triangle is left out.
+struct Range {
+  double low, high;
+};
+Range range_of(double a, double b, double c) { return {std::min(std::min(a, b), c), std::max(std::max(a, b), c)}; }
+
 class VisiblePointFinder {
 public:
   VisiblePointFinder(const PrimaryCamera& camera, const PlacedParts& parts)
@@ -78,13 +84,13 @@ private:
   /// Whether the triangle covers a pixel's centre, or may do so when its vertices move.
   /// @param movement world units
   bool may_cover_centre(const ImageTriangle& t, double movement) const {
-    const double depth = std::min({t[0].depth, t[1].depth, t[2].depth});
+    const auto [depth, farthest] = range_of(t[0].depth, t[1].depth, t[2].depth);
     const bool perspective = camera_.projection() == Projection::kPerspective;
-    if (perspective && !(depth > 2.0 * movement)) return std::max({t[0].depth, t[1].depth, t[2].depth}) > -movement;
+    if (perspective && !(depth > 2.0 * movement)) return farthest > -movement;
     // Beside the centre of the image, movement along the view direction adds to movement across it.
     const double margin = 4.0 * movement / (spread_ * (perspective ? depth : 1.0));
-    const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
-    const auto [top, bottom] = std::minmax({t[0].y, t[1].y, t[2].y});
+    const auto [left, right] = range_of(t[0].x, t[1].x, t[2].x);
+    const auto [top, bottom] = range_of(t[0].y, t[1].y, t[2].y);
     return has_centre(std::max(left - margin, 0.0) - 0.5, std::min(right + margin, width_) - 0.5) &&
            has_centre(std::max(top - margin, 0.0) - 0.5, std::min(bottom + margin, height_) - 0.5);
   }
@@ -101,11 +107,11 @@ private:
   /// @return the number of tested pixels
   double draw(const ImageTriangle& t, uint32_t number, NearestTriangles& buffer) const {
     double x0 = 0.0, x1 = width_ - 1.0, y0 = 0.0, y1 = height_ - 1.0; // numbers of pixels
-    const auto [least_depth, most_depth] = std::minmax({t[0].depth, t[1].depth, t[2].depth});
+    const auto [least_depth, most_depth] = range_of(t[0].depth, t[1].depth, t[2].depth);
     if (!(most_depth > 0.0)) return 0.0;
-    if (std::min({t[0].w, t[1].w, t[2].w}) > 0.0) {
-      const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
-      const auto [top, bottom] = std::minmax({t[0].y, t[1].y, t[2].y});
+    if (t[0].w > 0.0 && t[1].w > 0.0 && t[2].w > 0.0) {
+      const auto [left, right] = range_of(t[0].x, t[1].x, t[2].x);
+      const auto [top, bottom] = range_of(t[0].y, t[1].y, t[2].y);
       x0 = std::max(x0, std::ceil(left - 0.5)), x1 = std::min(x1, std::floor(right - 0.5));
       y0 = std::max(y0, std::ceil(top - 0.5)), y1 = std::min(y1, std::floor(bottom - 0.5));
     }
