@@ -47,15 +47,17 @@ private:
 
   /// Computes leaf_cost for all i at once: the least cost over k leaves on the left and i - k on the right.
   static void join(const RunNode& left, const RunNode& right, RunNode& out) {
-    alignas(16) float of_right[2 * kWidth]; // [kWidth + i - 1]: cost of the right side as at most i leaves
-    std::fill_n(of_right, kWidth, kInfinity);
-    std::copy_n(right.leaf_cost, kWidth, of_right + kWidth);
+    static_assert(kWidth == 8);
+    const Float4 none = Float4{} + kInfinity;
     Float4 low = load_lanes(out.leaf_cost), high = load_lanes(out.leaf_cost + 4);
+    // Costs of the right side as at most i - k leaves; in registers, because loads across two stores wait for both.
+    Float4 right_low = load_lanes(right.leaf_cost), right_high = load_lanes(right.leaf_cost + 4);
     for (uint32_t k = 1; k < kWidth; ++k) {
+      right_high = __builtin_shufflevector(right_low, right_high, 3, 4, 5, 6);
+      right_low = __builtin_shufflevector(none, right_low, 0, 4, 5, 6);
       const float on_left = left.leaf_cost[k - 1];
-      const float* on_right = of_right + kWidth - k;
-      low = min_of(low, on_left + load_lanes(on_right));
-      high = min_of(high, on_left + load_lanes(on_right + 4));
+      low = min_of(low, on_left + right_low);
+      high = min_of(high, on_left + right_high);
     }
     std::memcpy(out.leaf_cost, &low, sizeof low);
     std::memcpy(out.leaf_cost + 4, &high, sizeof high);
