@@ -159,8 +159,9 @@ private:
 
   void quantize_positions(const GeometryPart& part, const Mesh& mesh, std::vector<LatticePoint>& lattice) {
     lattice.resize(mesh.positions.size());
+    const PartMap place(part);
     const ErrorStats errors = accumulate_errors(mesh.positions.size(), [&](size_t i, ErrorStats& stats) {
-      const DVec3 p = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[i]));
+      const DVec3 p = place(mesh.positions[i]);
       lattice[i] = grid_.round(p);
       for (int axis = 0; axis < 3; ++axis)
         stats.add(std::abs(static_cast<double>(from_lattice(lattice[i][static_cast<size_t>(axis)], step_)) - p[axis]));

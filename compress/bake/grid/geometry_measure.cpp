@@ -74,8 +74,9 @@ Bounds measure_geometry(const Scene& scene, const GeometryPlan& plan, LengthHist
   for (const GeometryPart& part : plan.parts) {
     const Mesh& mesh = scene.meshes[part.mesh];
     points.resize(mesh.positions.size());
+    const PartMap place(part);
     for (size_t i = 0; i < points.size(); ++i) {
-      points[i] = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[i]));
+      points[i] = place(mesh.positions[i]);
       constexpr double kMax = std::numeric_limits<float>::max();
       const DVec3 p = glm::abs(points[i]);
       if (!(p.x <= kMax && p.y <= kMax && p.z <= kMax)) // also rejects NaN

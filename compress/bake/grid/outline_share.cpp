@@ -31,7 +31,8 @@ public:
 
   void add(const Mesh& mesh, const GeometryPart& part) {
     std::vector<uint8_t> chosen(mesh.positions.size());
-    const auto place = [&](uint32_t v) { return transform_point(part.geometry_from_mesh, DVec3(mesh.positions[v])); };
+    const PartMap map(part);
+    const auto place = [&](uint32_t v) { return map(mesh.positions[v]); };
     for (uint32_t v = 0; v < chosen.size(); ++v) chosen[v] = (position_key(place(v)) & mask_) == 0;
     for (const Triangle& t : mesh.triangles) {
       if (!(chosen[t.x] || chosen[t.y] || chosen[t.z])) continue;

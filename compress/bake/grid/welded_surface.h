@@ -12,14 +12,15 @@ namespace packtrace {
 /// Source positions of a geometry, in geometry space.
 class SourcePoints {
 public:
-  SourcePoints(const Scene& scene, const GeometryPlan& plan) : scene_(scene), plan_(plan) {}
+  SourcePoints(const Scene& scene, const GeometryPlan& plan) {
+    parts_.reserve(plan.parts.size());
+    for (const GeometryPart& part : plan.parts)
+      parts_.push_back({PartMap(part), std::span(scene.meshes[part.mesh].positions)});
+  }
 
   /// @param part number of the plan's part
   /// @param vertex vertex number in the part's mesh
-  DVec3 operator()(size_t part, uint32_t vertex) const {
-    const GeometryPart& p = plan_.parts[part];
-    return transform_point(p.geometry_from_mesh, DVec3(scene_.meshes[p.mesh].positions[vertex]));
-  }
+  DVec3 operator()(size_t part, uint32_t vertex) const { return parts_[part].place(parts_[part].positions[vertex]); }
 
   /// Whether two vertices have the same position as floats. One point of the source may differ in the last bits of
   /// doubles.
@@ -28,8 +29,11 @@ public:
   }
 
 private:
-  const Scene& scene_;
-  const GeometryPlan& plan_;
+  struct Part {
+    PartMap place;
+    std::span<const Vec3> positions;
+  };
+  std::vector<Part> parts_;
 };
 
 /// One part of a geometry on the lattice.

@@ -22,6 +22,21 @@ struct GeometryPart {
   const std::vector<uint32_t>* same_path = nullptr;
 };
 
+/// Places points of a part's mesh in its geometry. Most maps are the identity, which is not computed.
+class PartMap {
+public:
+  /// @param part must outlive this object
+  explicit PartMap(const GeometryPart& part)
+      : geometry_from_mesh_(part.geometry_from_mesh), moved_(geometry_from_mesh_ != DAffine(1.0)) {}
+
+  /// Returns the same as transform_point() for finite points; the sum turns -0 into 0 as that does.
+  DVec3 operator()(Vec3 p) const { return moved_ ? transform_point(geometry_from_mesh_, DVec3(p)) : DVec3(p) + 0.0; }
+
+private:
+  const DAffine& geometry_from_mesh_;
+  bool moved_;
+};
+
 /// A vertex of the source: a part of the plan and a vertex of its mesh.
 struct SourceVertex {
   uint32_t part = 0, vertex = 0;
