@@ -15,13 +15,13 @@ baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometr
   record.step_mantissa = q.grid.mantissa;
   record.step_exponent = q.grid.exponent;
   record.anchor_shift = q.anchor_shift;
-  record.uv_exponent = q.uv_exponent;
-  record.uv_encoding = static_cast<uint32_t>(q.uv_encoding);
-  record.normal_encoding = static_cast<uint32_t>(q.normal_encoding);
+  record.uv_exponent = stored_uv_exponent(q.uv_exponent);
+  record.uv_encoding = static_cast<uint8_t>(q.uv_encoding);
+  record.normal_encoding = static_cast<uint8_t>(q.normal_encoding);
   record.max_normal_error_degrees = static_cast<float>(q.stats.max_normal_error_degrees);
   record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
   record.max_uv_error = static_cast<float>(q.stats.max_uv_error);
-  record.flags = plan.world_space ? baked::kWorldSpace : 0;
+  record.flags = plan.world_space ? baked::kWorldSpace : uint16_t{0};
   record.slot_count = static_cast<uint32_t>(q.slot_class.size());
   return record;
 }

@@ -75,7 +75,7 @@ std::vector<uint32_t> clusters_of_cut(const LodGeometry& geometry, std::span<con
     return rank != kNoRank && rank_passes(passed, rank);
   };
   for (uint32_t i = 0; i < geometry.links().size(); ++i) {
-    const baked::LodLinkRecord& link = geometry.links()[i];
+    const LodLink& link = geometry.links()[i];
     if (passes(link.group)) continue;
     if (link.generating_group == baked::kNoLodGroup || passes(link.generating_group)) clusters.push_back(i);
   }

@@ -33,7 +33,7 @@ LodBall enclose(std::span<const LodBall> balls) {
 
 } // namespace
 
-LodGeometry::LodGeometry(std::span<const baked::LodGroupRecord> groups, std::span<const baked::LodLinkRecord> links,
+LodGeometry::LodGeometry(std::span<const baked::LodGroupRecord> groups, std::span<const LodLink> links,
                          std::span<const uint32_t> cluster_triangles)
     : links_(links.begin(), links.end()), cluster_triangles_(cluster_triangles.begin(), cluster_triangles.end()) {
   if (groups.empty() || links.empty()) reject("no groups or no clusters");
@@ -67,7 +67,7 @@ void LodGeometry::check_groups(std::span<const baked::LodGroupRecord> groups) {
 }
 
 void LodGeometry::check_links(std::span<const baked::LodGroupRecord> groups) {
-  for (const baked::LodLinkRecord& link : links_) {
+  for (const LodLink& link : links_) {
     if (link.group >= groups.size()) reject("a cluster is of no group");
     const baked::LodGroupRecord& own = groups[link.group];
     if ((own.level == 0) != (link.generating_group == baked::kNoLodGroup))
@@ -90,7 +90,7 @@ void LodGeometry::enlarge_balls(std::span<const baked::LodGroupRecord> groups) {
     return groups[links_[a].group].level < groups[links_[b].group].level;
   });
   for (const uint32_t cluster : order) {
-    const baked::LodLinkRecord& link = links_[cluster];
+    const LodLink& link = links_[cluster];
     if (link.generating_group == baked::kNoLodGroup) continue;
     LodBall& own = balls_[link.group];
     const LodBall& below = balls_[link.generating_group];

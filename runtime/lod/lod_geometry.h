@@ -51,7 +51,7 @@ public:
   /// @param cluster_triangles per cluster
   /// Throws Error(kInput) if numbers are not finite, levels have gaps, links are invalid or do not go down one level,
   /// or a group's error is smaller than that of a group below.
-  LodGeometry(std::span<const baked::LodGroupRecord> groups, std::span<const baked::LodLinkRecord> links,
+  LodGeometry(std::span<const baked::LodGroupRecord> groups, std::span<const LodLink> links,
               std::span<const uint32_t> cluster_triangles);
 
   std::span<const LodLevel> levels() const { return levels_; }
@@ -60,7 +60,7 @@ public:
   uint32_t rank_count() const { return static_cast<uint32_t>(ranks_.error.size()); }
   /// kNoRank for terminal groups.
   uint32_t rank_of_group(uint32_t group) const { return rank_of_group_[group]; }
-  std::span<const baked::LodLinkRecord> links() const { return links_; }
+  std::span<const LodLink> links() const { return links_; }
   std::span<const uint32_t> cluster_triangles() const { return cluster_triangles_; }
 
   /// Contains the spheres of all groups.
@@ -81,7 +81,7 @@ private:
   void count_levels(std::span<const baked::LodGroupRecord> groups);
   void rank_groups(std::span<const baked::LodGroupRecord> groups);
 
-  std::vector<baked::LodLinkRecord> links_;
+  std::vector<LodLink> links_;
   std::vector<uint32_t> cluster_triangles_;
   std::vector<LodBall> balls_; ///< per group; used only while loading
   std::vector<LodLevel> levels_;

@@ -173,7 +173,7 @@ TEST(BakeScene, EncodingsOfTextureCoordinatesAreSelectable) {
     const BakedScene baked = bake(scene, config);
     const BakedFile file = BakedFile::from_bytes(baked.bytes);
     EXPECT_EQ(file.geometries()[0].uv_encoding, static_cast<uint32_t>(encoding));
-    EXPECT_EQ(file.geometries()[0].uv_exponent, (std::array<int32_t, 2>{}));
+    EXPECT_EQ(file.geometries()[0].uv_exponent, (std::array<int16_t, 2>{}));
     ASSERT_EQ(baked.report.file.uvs.size(), 1u);
     EXPECT_EQ(baked.report.file.uvs[0].encoding, encoding);
     const float bound = encoding == UvEncoding::kUnorm16 ? 0.5f / 65535.0f + 0x1p-24f : 0x1p-12f;

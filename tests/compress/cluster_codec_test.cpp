@@ -23,7 +23,7 @@ struct Case {
 
   Case() {
     geometry.step_mantissa = 8, geometry.step_exponent = -10;
-    geometry.normal_encoding = static_cast<uint32_t>(NormalEncoding::kZsign32);
+    geometry.normal_encoding = static_cast<uint8_t>(NormalEncoding::kZsign32);
   }
   NormalEncoding encoding() const { return static_cast<NormalEncoding>(geometry.normal_encoding); }
 };
@@ -171,7 +171,7 @@ TEST(ClusterCodec, GoldenBytes) {
 TEST(ClusterCodec, GoldenBytesOfNormalsAcrossAnEdgeOfTheCube) {
   constexpr auto kEncoding = NormalEncoding::kAxis24;
   Case c;
-  c.geometry.normal_encoding = static_cast<uint32_t>(kEncoding);
+  c.geometry.normal_encoding = static_cast<uint8_t>(kEncoding);
   c.triangles = {{0, 1, 2}, {2, 1, 3}};
   c.positions = {{100, 7, -3}, {101, 7, -3}, {100, 7, 0}, {103, 7, -1}};
   // On the faces +z and +x, at most three codes from their common edge. Unfolded around +x, y is
@@ -228,7 +228,7 @@ protected:
   uint32_t code(DVec3 n) const { return encode_normal(GetParam(), n); }
   Case make_case(test::Random& random) const {
     Case c = random_case(random, 60);
-    c.geometry.normal_encoding = static_cast<uint32_t>(GetParam());
+    c.geometry.normal_encoding = static_cast<uint8_t>(GetParam());
     return c;
   }
   static DVec3 any_direction(test::Random& random) {
@@ -338,7 +338,7 @@ TEST_P(ClusterNormals, AllAtOnceAreThoseOneByOne) {
     const uint32_t vertex_count = 3 + random.bits() % 254;
     baked::GeometryRecord geometry{};
     geometry.step_mantissa = 8;
-    geometry.normal_encoding = static_cast<uint32_t>(GetParam());
+    geometry.normal_encoding = static_cast<uint8_t>(GetParam());
     const uint32_t width = round % 3 == 0 ? 17 : 1 + random.bits() % 12;
     baked::ClusterRecord record{};
     record.triangle_count = record.strip_count = 128;

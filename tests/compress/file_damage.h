@@ -26,7 +26,8 @@ inline ErrorKind open_kind(std::span<const std::byte> bytes, std::string* messag
 }
 
 /// Changes one u32 of a file and returns the error message of opening it.
-inline std::string message_after(std::vector<std::byte> bytes, baked::Section section, size_t at, uint32_t value) {
+template <class T>
+std::string message_after(std::vector<std::byte> bytes, baked::Section section, size_t at, T value) {
   baked::FileHeader header;
   std::memcpy(&header, bytes.data(), sizeof header);
   std::memcpy(bytes.data() + header.sections[section].offset + at, &value, sizeof value);

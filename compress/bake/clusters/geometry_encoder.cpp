@@ -36,9 +36,9 @@ public:
     frame_.step_mantissa = geometry.grid.mantissa;
     frame_.step_exponent = geometry.grid.exponent;
     frame_.anchor_shift = geometry.anchor_shift;
-    frame_.uv_encoding = static_cast<uint32_t>(geometry.uv_encoding);
-    frame_.uv_exponent = geometry.uv_exponent;
-    frame_.normal_encoding = static_cast<uint32_t>(geometry.normal_encoding);
+    frame_.uv_encoding = static_cast<uint8_t>(geometry.uv_encoding);
+    frame_.uv_exponent = stored_uv_exponent(geometry.uv_exponent);
+    frame_.normal_encoding = static_cast<uint8_t>(geometry.normal_encoding);
   }
 
   EncodedChunk run(std::span<const ClusterRange> clusters) {

@@ -137,15 +137,17 @@ void encode_level(QuantizedGeometry& geometry, GeometryClusters& clusters, std::
 EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod, bool coarser_normals) {
   EncodedLod out;
   if (lod.level_count < 2 || !GroupEncoder(geometry, lod).run(out.groups)) return {};
+  out.levels.resize(lod.level_count);
+  for (const baked::LodGroupRecord& group : out.groups)
+    if (++out.levels[group.level].group_count > baked::kMaxLodGroups) return {};
   geometry.positions = std::move(lod.positions);
   geometry.vertices = std::move(lod.vertices);
   GeometryClusters level_clusters;
   level_clusters.triangles = std::move(lod.triangles);
   std::vector<double> errors; // of the level's clusters
-  out.levels.resize(lod.level_count);
-  for (const baked::LodGroupRecord& group : out.groups) ++out.levels[group.level].group_count;
   uint64_t terminal = 0;
   float error = 0.0f;
+  uint32_t own = 0, below = 0; // first group of the level, and of the one below
   for (uint32_t level = 0, begin = 0, end = 0; level < lod.level_count; ++level, begin = end) {
     while (end < lod.clusters.size() && lod.clusters[end].level == level) ++end;
     const std::vector<uint32_t> order =
@@ -156,7 +158,8 @@ EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod, bool coarser
     to.error = error;
     for (uint32_t i = begin; i < end; ++i) {
       const LodCluster& c = lod.clusters[level == 0 ? i : order[i - begin]]; // level 0 keeps its stored order
-      out.links.push_back({c.group, c.generating_group});
+      out.links.push_back({static_cast<uint16_t>(c.group - own),
+                           level == 0 ? uint16_t{0} : static_cast<uint16_t>(c.generating_group - below)});
       if (level > 0) level_clusters.clusters.push_back(c.range), errors.push_back(lod.groups[c.generating_group].error);
       to.triangles += c.range.triangle_count;
       if (lod.groups[c.group].terminal)
@@ -165,6 +168,7 @@ EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod, bool coarser
         error = std::max(error, out.groups[c.group].error);
     }
     if (level > 0) encode_level(geometry, level_clusters, errors, coarser_normals, to);
+    below = own, own += to.group_count;
   }
   return out;
 }

@@ -28,7 +28,8 @@ struct EncodedLod {
 /// Encodes levels on the geometry's lattice. Errors and spheres are in object units, of the decoded surfaces: they
 /// include the rounding of positions to float, but not the quantisation error of level 0. The validator's rules hold,
 /// also in float: errors do not decrease, and spheres contain those of the groups below. Returns an empty result if
-/// there is only one level, or if a sphere or an error exceeds the range of float.
+/// there is only one level, if a level has more than kMaxLodGroups groups, or if a sphere or an error exceeds the
+/// range of float.
 /// @param geometry the geometry that `lod` was built from; receives the levels' positions and vertices
 /// @param lod is consumed
 /// @param coarser_normals levels may have normals of fewer bits (level_normal_limit())

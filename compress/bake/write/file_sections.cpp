@@ -131,22 +131,24 @@ void FileSections::add_geometry(baked::GeometryRecord record, const EncodedGeome
 }
 
 void FileSections::add_lod(uint32_t base, const EncodedLod& lod) {
-  uint64_t first_group = lod_groups_.size(), first_link = lod_links_.size();
+  require(lod_groups_.size() + lod.groups.size() <= ~0u && lod_links_.size() + lod.links.size() <= ~0u,
+          "levels of detail have 2^32 groups or clusters, or more");
+  auto first_group = static_cast<uint32_t>(lod_groups_.size()), first_link = static_cast<uint32_t>(lod_links_.size());
   for (uint32_t number = 0; number < lod.levels.size(); ++number) {
     const EncodedLod::Level& level = lod.levels[number];
     const auto geometry = number == 0 ? base : static_cast<uint32_t>(geometries_.size());
     if (number > 0) {
       baked::GeometryRecord record = geometries_[base];
-      record.flags |= baked::kLodLevel;
+      record.flags = static_cast<uint16_t>(record.flags | baked::kLodLevel);
       record.name = {};
-      record.normal_encoding = static_cast<uint32_t>(level.normal_encoding);
+      record.normal_encoding = static_cast<uint8_t>(level.normal_encoding);
       record.max_normal_error_degrees = std::min(record.max_normal_error_degrees + level.max_normal_error, 180.0f);
       record.mean_normal_error_degrees =
           std::min(record.mean_normal_error_degrees + level.mean_normal_error, record.max_normal_error_degrees);
       append(record, level.encoded);
     }
-    lod_levels_.push_back(
-        {first_group, first_link, level.triangles, base, number, geometry, level.group_count, level.error, 0});
+    lod_levels_.push_back({first_group, first_link, static_cast<uint32_t>(level.triangles), base, geometry,
+                           static_cast<uint16_t>(level.group_count), static_cast<uint16_t>(number), level.error});
     first_group += level.group_count, first_link += geometries_[geometry].cluster_count;
   }
   lod_groups_.insert(lod_groups_.end(), lod.groups.begin(), lod.groups.end());
@@ -154,7 +156,8 @@ void FileSections::add_lod(uint32_t base, const EncodedLod& lod) {
 }
 
 void FileSections::append(baked::GeometryRecord& record, const EncodedGeometry& encoded) {
-  record.first_cluster = clusters_.size();
+  require(clusters_.size() + encoded.clusters.size() <= ~0u, "geometry has 2^32 clusters, or more");
+  record.first_cluster = static_cast<uint32_t>(clusters_.size());
   record.payload_offset = payload_.size() - kReadSlackBytes;
   record.payload_bytes = encoded.payload.size();
   record.cluster_count = static_cast<uint32_t>(encoded.clusters.size());

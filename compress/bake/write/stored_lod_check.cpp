@@ -11,6 +11,8 @@ std::optional<std::string_view> find_level_fault(const EncodedLod& lod) {
   for (size_t level = 0; level < lod.levels.size(); ++level) {
     const EncodedGeometry& e = lod.levels[level].encoded;
     if (level == 0 && !(e.clusters.empty() && e.payload.empty())) return "clusters of level 0";
+    if (lod.levels[level].group_count > baked::kMaxLodGroups) return "number of groups";
+    if (lod.levels[level].triangles > ~0u) return "number of triangles";
     if (e.payload.size() % 4 != 0) return "size of the payload";
     const uint64_t bits = 8 * uint64_t{e.payload.size()};
     for (const uint64_t stream :

@@ -32,6 +32,11 @@ inline constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
 /// Codes per texel of the finest texture that a geometry uses.
 inline constexpr double kUvCodesPerTexel = 16.0;
 
+/// The exponents as geometry records hold them.
+inline std::array<int16_t, 2> stored_uv_exponent(const std::array<int32_t, 2>& exponent) {
+  return {static_cast<int16_t>(exponent[0]), static_cast<int16_t>(exponent[1])};
+}
+
 /// Chooses the exponent e of the lattice step 2^e for one axis. The step is at most 1 / (16 texels |scale|), unless
 /// max_abs would then exceed the lattice; in that case it is 2^-6 ulp of max_abs.
 /// @param texels the texture's size along the axis, >= 1

@@ -138,7 +138,7 @@ private:
         fail("geometry", i, "normal error");
       if (g.normal_encoding >= kNormalFormats.size()) fail("geometry", i, "normal encoding");
       if (g.uv_encoding >= kUvEncodingNames.size() ||
-          (g.uv_encoding != static_cast<uint32_t>(UvEncoding::kLattice) && g.uv_exponent != std::array<int32_t, 2>{}))
+          (g.uv_encoding != static_cast<uint32_t>(UvEncoding::kLattice) && g.uv_exponent != std::array<int16_t, 2>{}))
         fail("geometry", i, "texture coordinate encoding");
       if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
       if ((g.requirements & ~baked::kAllRequirements) != 0) fail("geometry", i, "requirements");

@@ -67,18 +67,19 @@ private:
       const uint64_t number = level.first_link + c;
       const baked::LodLinkRecord& link = s_.lod_links[static_cast<size_t>(number)];
       const auto fault = [&](const char* what) { return LodFault{"lod link", number, what}; };
-      if (link.group < first || link.group - first >= level.group_count) return fault("group");
-      const baked::LodGroupRecord& group = groups_[link.group];
-      has_members_[link.group] = 1;
+      if (link.group >= level.group_count) return fault("group");
+      const baked::LodGroupRecord& group = groups_[static_cast<size_t>(first + link.group)];
+      has_members_[static_cast<size_t>(first + link.group)] = 1;
       if (level.level == 0) {
-        if (link.generating_group != baked::kNoLodGroup) return fault("generating group");
+        if (link.generating_group != 0) return fault("generating group");
       } else {
-        if (link.generating_group < below || link.generating_group >= first) return fault("generating group");
-        const baked::LodGroupRecord& generating = groups_[link.generating_group];
+        if (link.generating_group >= first - below) return fault("generating group");
+        const auto made_from = static_cast<size_t>(below + link.generating_group);
+        const baked::LodGroupRecord& generating = groups_[made_from];
         if (!std::isfinite(generating.error)) return fault("generating group is terminal");
         if (group.error < generating.error) return fault("error below that of the generating group");
         if (!baked::holds_sphere(group, generating)) return fault("sphere does not hold that of the generating group");
-        has_coarser_clusters_[link.generating_group] = 1;
+        has_coarser_clusters_[made_from] = 1;
       }
       const uint32_t triangles = s_.clusters[static_cast<size_t>(g.first_cluster + c)].triangle_count;
       own += triangles;
@@ -127,7 +128,6 @@ std::optional<LodFault> find_lod_level_fault(const BakedSections& s) {
     if (l.group_count == 0 || l.group_count > g.cluster_count) return fault("number of groups");
     if (l.first_group != next_group || l.group_count > s.lod_groups.size() - next_group) return fault("groups");
     if (l.first_link != next_link || g.cluster_count > s.lod_links.size() - next_link) return fault("links");
-    if (l.reserved != 0) return fault("reserved field");
     next_geometry += !first;
     next_group += l.group_count, next_link += g.cluster_count;
   }

@@ -26,7 +26,7 @@ LodGeometry without_levels(const BakedFile& file, uint32_t geometry) {
     for (int axis = 0; axis < 3; ++axis) group.center[static_cast<size_t>(axis)] = static_cast<float>(center[axis]);
     group.radius = static_cast<float>(box.diagonal()) * 0.51f;
   }
-  const std::vector<baked::LodLinkRecord> links(triangles.size(), {0, baked::kNoLodGroup});
+  const std::vector<LodLink> links(triangles.size(), {0, baked::kNoLodGroup});
   return {{&group, 1}, links, triangles};
 }
 
@@ -46,7 +46,7 @@ std::vector<LodGeometry> lod_geometries(const BakedFile& file) {
     for (const baked::LodLevelRecord& level : lod.levels)
       for (const baked::ClusterRecord& cluster : file.clusters(level.geometry))
         triangles.push_back(cluster.triangle_count);
-    geometries.emplace_back(lod.groups, lod.links, triangles);
+    geometries.emplace_back(lod.groups, lod.links(), triangles);
   }
   return geometries;
 }

@@ -277,7 +277,7 @@ ClusterLod read_lod(const BakedFile& file, uint32_t geometry) {
     const uint32_t of_level = view.levels[level].geometry;
     for (uint32_t c = 0; c < file.clusters(of_level).size(); ++c) {
       const ClusterView cluster = file.cluster(of_level, c);
-      const baked::LodLinkRecord& link = view.links_of(level)[c];
+      const LodLink link = view.links_of(level)[c];
       const auto first_vertex = static_cast<uint32_t>(lod.vertices.size());
       lod.clusters.push_back({{static_cast<uint32_t>(lod.triangles.size()), cluster.triangle_count(), 0},
                               level,

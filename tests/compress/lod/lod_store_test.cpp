@@ -122,8 +122,8 @@ TEST(LodStore, LevelsThatNoFileMayHoldAreMadeAgain) {
   EXPECT_TRUE(kept.refuses(kGroups, offsetof(baked::LodGroupRecord, error), infinite));
   EXPECT_TRUE(kept.refuses(kGroups, offsetof(baked::LodGroupRecord, center), 1e30f));
   EXPECT_TRUE(kept.refuses(kGroups, offsetof(baked::LodGroupRecord, level), 7u));
-  EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, group), ~0u));
-  EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, generating_group), 0u));
+  EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, group), uint16_t{0xffff}));
+  EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, generating_group), uint16_t{1}));
   EXPECT_TRUE(kept.refuses(kLinks, kept.bytes(kLinks) - sizeof(uint32_t), ~0u));
   // Fields of a level: triangles, payload bytes, stream bits, counts, clusters by class, bounds, error, normals.
   constexpr size_t kLevelBytes = 136;

@@ -40,7 +40,7 @@ inline void put_cut(Dump& out, const BakedFile& file, uint32_t geometry) {
   std::vector<uint32_t> cut;
   for (size_t level = 0; level < lod.levels.size(); ++level)
     for (uint32_t c = 0; c < lod.links_of(level).size(); ++c) {
-      const baked::LodLinkRecord& link = lod.links_of(level)[c];
+      const LodLink link = lod.links_of(level)[c];
       const float made = link.generating_group == baked::kNoLodGroup ? 0.0f : lod.groups[link.generating_group].error;
       if (lod.groups[link.group].error > threshold && made <= threshold)
         cut.insert(cut.end(), {lod.levels[level].geometry, c});

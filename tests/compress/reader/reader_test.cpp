@@ -245,7 +245,7 @@ TEST_F(IndependentReader, DecodesLevelsOfDetailAndCutsThem) {
   baked::FileHeader header;
   std::memcpy(&header, baked().data(), sizeof header);
   const size_t at = header.sections[baked::kLodLevels].offset + sizeof(baked::LodLevelRecord);
-  std::memset(baked().data() + at + offsetof(baked::LodLevelRecord, triangles), 0, sizeof(uint64_t));
+  std::memset(baked().data() + at + offsetof(baked::LodLevelRecord, triangles), 0, sizeof(uint32_t));
   EXPECT_EQ(read(), 3);
 }
 

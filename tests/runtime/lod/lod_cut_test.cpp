@@ -49,7 +49,7 @@ std::vector<uint32_t> brute_force(const Case& c) {
   };
   std::vector<uint32_t> clusters;
   for (uint32_t i = 0; i < c.geometry.links().size(); ++i) {
-    const baked::LodLinkRecord& link = c.geometry.links()[i];
+    const LodLink& link = c.geometry.links()[i];
     if (!passes(link.group) && (link.generating_group == baked::kNoLodGroup || passes(link.generating_group)))
       clusters.push_back(i);
   }
@@ -59,7 +59,7 @@ std::vector<uint32_t> brute_force(const Case& c) {
 /// The cut by traversal from the groups without coarser clusters downwards, stopping where a group passes.
 std::vector<uint32_t> traverse(const Case& c) {
   const InstanceMetric metric = c.metric();
-  const std::span<const baked::LodLinkRecord> links = c.geometry.links();
+  const std::span<const LodLink> links = c.geometry.links();
   std::vector<std::vector<uint32_t>> members;
   for (uint32_t i = 0; i < links.size(); ++i) {
     if (links[i].group >= members.size()) members.resize(links[i].group + 1);
@@ -87,7 +87,7 @@ std::vector<uint32_t> traverse(const Case& c) {
 /// Checks that every chain from a cluster of level 0, through any clusters made from its group, has one cluster in the
 /// cut.
 void expect_each_chain_cut_once(const LodGeometry& geometry, const std::vector<uint32_t>& cut) {
-  const std::span<const baked::LodLinkRecord> links = geometry.links();
+  const std::span<const LodLink> links = geometry.links();
   std::vector<std::vector<uint32_t>> made;
   std::vector<bool> taken(links.size());
   for (const uint32_t c : cut) taken[c] = true;

@@ -60,7 +60,7 @@ TEST(LodGeometry, BallsHoldThoseBelowAndTheWholeHoldsAll) {
     return LodBall{{ranks.center_x[rank], ranks.center_y[rank], ranks.center_z[rank]}, ranks.radius[rank]};
   };
   size_t pairs = 0;
-  for (const baked::LodLinkRecord& link : records.links) {
+  for (const LodLink& link : records.links) {
     if (link.generating_group == baked::kNoLodGroup || geometry.rank_of_group(link.group) == kNoRank) continue;
     const LodBall above = ball(geometry.rank_of_group(link.group));
     const LodBall below = ball(geometry.rank_of_group(link.generating_group));
@@ -113,7 +113,7 @@ TEST(LodGeometry, RatioStepsHoldLessThanTheRatioTimesTheCoarsestCut) {
 
 TEST(LodGeometry, GeometryOfOneLevelHasOneStep) {
   const baked::LodGroupRecord group{{0, 0, 0}, 1.0f, kInfinite, 0};
-  const baked::LodLinkRecord link{0, baked::kNoLodGroup};
+  const LodLink link{0, baked::kNoLodGroup};
   const uint32_t triangles = 12;
   const LodGeometry geometry({&group, 1}, {&link, 1}, {&triangles, 1});
   EXPECT_EQ(geometry.last_level(), 0u);

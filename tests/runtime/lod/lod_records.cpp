@@ -43,8 +43,11 @@ LodRecords records_of(const BuiltLod& built) {
   QuantizedGeometry geometry = built.geometry;
   ClusterLod lod = built.lod;
   EncodedLod encoded = encode_lod(geometry, lod);
-  LodRecords out{std::move(encoded.groups), std::move(encoded.links), {}};
-  for (const LodCluster& c : built.lod.clusters) out.cluster_triangles.push_back(c.range.triangle_count);
+  LodRecords out{std::move(encoded.groups), {}, {}};
+  for (const LodCluster& c : built.lod.clusters) {
+    out.links.push_back({c.group, c.generating_group});
+    out.cluster_triangles.push_back(c.range.triangle_count);
+  }
   return out;
 }
 

@@ -14,7 +14,7 @@ namespace packtrace::test {
 /// LOD levels as stored in a file.
 struct LodRecords {
   std::vector<baked::LodGroupRecord> groups;
-  std::vector<baked::LodLinkRecord> links;
+  std::vector<LodLink> links;
   std::vector<uint32_t> cluster_triangles;
 
   LodGeometry geometry() const { return {groups, links, cluster_triangles}; }

@@ -27,7 +27,7 @@ uint32_t level_of_group(const LodGeometry& geometry, uint32_t group) {
 /// selects one of several chains.
 std::vector<uint32_t> levels_of_triangles(const LodGeometry& geometry, std::span<const uint64_t> passed,
                                           uint32_t turn) {
-  const std::span<const baked::LodLinkRecord> links = geometry.links();
+  const std::span<const LodLink> links = geometry.links();
   std::vector<std::vector<uint32_t>> made(links.size() + 1);
   for (uint32_t i = 0; i < links.size(); ++i)
     if (links[i].generating_group != baked::kNoLodGroup) made[links[i].generating_group].push_back(i);

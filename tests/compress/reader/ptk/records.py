@@ -2,7 +2,7 @@
 
 import struct
 
-VERSION = 11
+VERSION = 12
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 576
 NONE = 0xFFFFFFFF
@@ -58,14 +58,14 @@ class Record:
 
 
 GEOMETRY = Record(
-    ("first_cluster", "Q"), ("payload_offset", "Q"), ("payload_bytes", "Q"), ("origin", "3q"),
+    ("payload_offset", "Q"), ("payload_bytes", "Q"), ("origin", "3q"),
     ("max_position_error", "d"), ("position_error_bound", "d"),
-    ("cluster_count", "I"), ("triangle_count", "I"), ("vertex_count", "I"),
-    ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2i"),
+    ("first_cluster", "I"), ("cluster_count", "I"), ("triangle_count", "I"), ("vertex_count", "I"),
+    ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2h"),
     ("bounds_lo", "3f"), ("bounds_hi", "3f"),
     ("max_normal_error_degrees", "f"), ("mean_normal_error_degrees", "f"), ("max_uv_error", "f"),
-    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("uv_encoding", "I"),
-    ("slot_count", "I"), ("requirements", "I"))
+    ("class_clusters", "8I"), ("name", "2I"), ("slot_count", "I"), ("requirements", "I"),
+    ("flags", "H"), ("normal_encoding", "B"), ("uv_encoding", "B"))
 CLUSTER = Record(
     ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material_slot", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
@@ -95,10 +95,10 @@ REQUIREMENT = Record(
     ("triangles", "Q"), ("source_bytes", "Q"), ("stored_bits", "Q"))
 
 LOD_LEVEL_RECORD = Record(
-    ("first_group", "Q"), ("first_link", "Q"), ("triangles", "Q"), ("base", "I"), ("level", "I"), ("geometry", "I"),
-    ("group_count", "I"), ("error", "f"), ("reserved", "I"))
+    ("first_group", "I"), ("first_link", "I"), ("triangles", "I"), ("base", "I"), ("geometry", "I"),
+    ("group_count", "H"), ("level", "H"), ("error", "f"))
 LOD_GROUP = Record(("center", "3f"), ("radius", "f"), ("error", "f"), ("level", "I"))
-LOD_LINK = Record(("group", "I"), ("generating_group", "I"))
+LOD_LINK = Record(("group", "H"), ("generating_group", "H"))
 
 TREE = Record(
     ("first_node", "Q"), ("node_count", "I"), ("depth", "I"), ("origin", "3q"), ("step_mantissa", "I"),

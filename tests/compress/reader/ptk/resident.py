@@ -3,7 +3,7 @@
 import math
 import struct
 
-from ptk.records import (HAS_NORMALS, HAS_UVS, HEADER_BYTES, MAGIC, NONE, SECTIONS, VERSION, BadFile, Bits, to_float32)
+from ptk.records import (HAS_NORMALS, HAS_UVS, HEADER_BYTES, MAGIC, SECTIONS, VERSION, BadFile, Bits, to_float32)
 from ptk.streams import Mesh, read_lattice, read_normals, read_triangles, read_uvs
 
 
@@ -56,14 +56,14 @@ class BakedFile:
     def cut(self, base, threshold):
         """Returns the LOD cut of a geometry for errors up to `threshold`: pairs of a geometry and a cluster index there."""
         levels = self.levels(base)
-        groups = self.sections["lod_groups"][levels[0]["first_group"]:]
+        groups = self.sections["lod_groups"]
         chosen = []
-        for level in levels:
+        for below, level in zip([None] + levels, levels):
             geometry = self.sections["geometries"][level["geometry"]]
             for number in range(geometry["cluster_count"]):
                 link = self.sections["lod_links"][level["first_link"] + number]
-                made = 0.0 if link["generating_group"] == NONE else groups[link["generating_group"]]["error"]
-                if groups[link["group"]]["error"] > threshold >= made:
+                made = 0.0 if below is None else groups[below["first_group"] + link["generating_group"]]["error"]
+                if groups[level["first_group"] + link["group"]]["error"] > threshold >= made:
                     chosen.append((level["geometry"], number))
         return chosen
 
