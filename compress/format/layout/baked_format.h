@@ -75,33 +75,33 @@ inline constexpr uint16_t kWorldSpace = 1u << 0; ///< lies on the scene's grid; 
 inline constexpr uint16_t kLodLevel = 1u << 1;
 inline constexpr uint16_t kGeometryFlags = kWorldSpace | kLodLevel;
 
-/// Clusters of one geometry, ordered by material_class().
+/// Clusters of one geometry, ordered by material_class(). The order of the fields needs no padding and compresses well.
 struct GeometryRecord {
-  uint64_t payload_offset;       ///< bytes into the payload section, multiple of 4
-  uint64_t payload_bytes;        ///< multiple of 4
   std::array<int64_t, 3> origin; ///< of the grid, in lattice steps
   double max_position_error;     ///< measured, largest axis, object units
   double position_error_bound;   ///< upper bound from the step and the rounding to float, >= max_position_error
-  uint32_t first_cluster;
-  uint32_t cluster_count;
-  uint32_t triangle_count;
-  uint32_t vertex_count; ///< sum over clusters
   uint32_t step_mantissa;
   int32_t step_exponent;
   uint32_t anchor_shift;              ///< cluster anchors are in units of 2^anchor_shift steps
   std::array<int16_t, 2> uv_exponent; ///< u, v; 0 unless the encoding is the lattice
-  std::array<float, 3> bounds_lo;     ///< of the decoded vertices; lo > hi if there are none
+  uint16_t flags;
+  uint8_t normal_encoding;        ///< normal_codec.h; the same for all its clusters
+  uint8_t uv_encoding;            ///< uv_codec.h; the same for all its clusters
+  std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi if there are none
   std::array<float, 3> bounds_hi;
   float max_normal_error_degrees;  ///< measured against the source
   float mean_normal_error_degrees; ///< mean over all its normals
   float max_uv_error;
+  uint64_t payload_offset;                ///< bytes into the payload section, multiple of 4
+  uint64_t payload_bytes;                 ///< multiple of 4
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
+  uint32_t first_cluster;
+  uint32_t cluster_count;
+  uint32_t triangle_count;
+  uint32_t vertex_count; ///< sum over clusters
   StringRef name;
   uint32_t slot_count;   ///< number of material slots, which are ordered by material_class(); 0 without clusters
   uint32_t requirements; ///< requirement_bit()s of the reasons that hold for some of its triangles
-  uint16_t flags;
-  uint8_t normal_encoding; ///< normal_codec.h; the same for all its clusters
-  uint8_t uv_encoding;     ///< uv_codec.h; the same for all its clusters
 };
 
 // ClusterRecord::flags
@@ -248,10 +248,11 @@ static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHe
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
               offsetof(FileHeader, header_hash) == 568);
 static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 176 && alignof(GeometryRecord) == 8);
-static_assert(offsetof(GeometryRecord, origin) == 16 && offsetof(GeometryRecord, cluster_count) == 60 &&
-              offsetof(GeometryRecord, bounds_lo) == 88 && offsetof(GeometryRecord, class_clusters) == 124 &&
-              offsetof(GeometryRecord, name) == 156 && offsetof(GeometryRecord, slot_count) == 164 &&
-              offsetof(GeometryRecord, flags) == 172 && offsetof(GeometryRecord, normal_encoding) == 174);
+static_assert(offsetof(GeometryRecord, step_mantissa) == 40 && offsetof(GeometryRecord, flags) == 56 &&
+              offsetof(GeometryRecord, normal_encoding) == 58 && offsetof(GeometryRecord, bounds_lo) == 60 &&
+              offsetof(GeometryRecord, payload_offset) == 96 && offsetof(GeometryRecord, class_clusters) == 112 &&
+              offsetof(GeometryRecord, cluster_count) == 148 && offsetof(GeometryRecord, name) == 160 &&
+              offsetof(GeometryRecord, slot_count) == 168);
 static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(ClusterRecord) == 4);
 static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, normal_anchor) == 28 &&
               offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&

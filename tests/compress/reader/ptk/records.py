@@ -58,14 +58,13 @@ class Record:
 
 
 GEOMETRY = Record(
-    ("payload_offset", "Q"), ("payload_bytes", "Q"), ("origin", "3q"),
-    ("max_position_error", "d"), ("position_error_bound", "d"),
-    ("first_cluster", "I"), ("cluster_count", "I"), ("triangle_count", "I"), ("vertex_count", "I"),
+    ("origin", "3q"), ("max_position_error", "d"), ("position_error_bound", "d"),
     ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2h"),
-    ("bounds_lo", "3f"), ("bounds_hi", "3f"),
+    ("flags", "H"), ("normal_encoding", "B"), ("uv_encoding", "B"), ("bounds_lo", "3f"), ("bounds_hi", "3f"),
     ("max_normal_error_degrees", "f"), ("mean_normal_error_degrees", "f"), ("max_uv_error", "f"),
-    ("class_clusters", "8I"), ("name", "2I"), ("slot_count", "I"), ("requirements", "I"),
-    ("flags", "H"), ("normal_encoding", "B"), ("uv_encoding", "B"))
+    ("payload_offset", "Q"), ("payload_bytes", "Q"), ("class_clusters", "8I"), ("first_cluster", "I"),
+    ("cluster_count", "I"), ("triangle_count", "I"), ("vertex_count", "I"), ("name", "2I"),
+    ("slot_count", "I"), ("requirements", "I"))
 CLUSTER = Record(
     ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material_slot", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
