@@ -46,8 +46,7 @@ void register_records() {
                        merged_vertices, collapsed_triangles, bounds_lo, bounds_hi, origin, precision_value,
                        precision_kind, world_step_mantissa, world_step_exponent, purpose, stream_bits, left_out,
                        coinciding_triangles, source_area, collapsed_area);
-  PYBIND11_NUMPY_DTYPE(LodLevelRecord, first_group, first_link, triangles, base, level, geometry, group_count, error,
-                       reserved);
+  PYBIND11_NUMPY_DTYPE(LodLevelRecord, first_group, first_link, triangles, base, level, geometry, group_count, error);
   PYBIND11_NUMPY_DTYPE(LodGroupRecord, center, radius, error, level);
   PYBIND11_NUMPY_DTYPE(LodLinkRecord, group, generating_group);
   PYBIND11_NUMPY_DTYPE(TreeRecord, first_node, node_count, depth, origin, step_mantissa, step_exponent, geometry,
