@@ -217,9 +217,10 @@ double hit_distance(const Probe& probe, const std::array<DVec3, 3>& t, DVec3 nor
   return glm::dot(a, normal) / facing;
 }
 
-/// A box around all points of another one that a map moves and floats round.
+/// Returns a box that contains all points of `box` after a transform whose results are rounded to floats.
 Bounds moved_box(const DAffine& to_from, const Bounds& box) {
-  constexpr double kRounding = 1e-6, kLargest = 1e38; // above the rounding of floats; below their limit
+  constexpr double kRounding = 1e-6; // above the relative rounding error of a float
+  constexpr double kLargest = 1e38;  // below the largest float
   const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
   const DVec3 terms =
       glm::abs(to_from[0]) * far.x + glm::abs(to_from[1]) * far.y + glm::abs(to_from[2]) * far.z + glm::abs(to_from[3]);
@@ -230,7 +231,8 @@ Bounds moved_box(const DAffine& to_from, const Bounds& box) {
   return moved;
 }
 
-/// A box around some triangles of a placed mesh in world space, in fewer steps than their exact one.
+/// Returns a box in world space that contains some triangles of a placed mesh. It may be larger than their exact box,
+/// but transforms one box instead of each corner.
 Bounds box_around(const PlacedPart& placed, const Mesh& mesh, std::span<const Triangle> triangles) {
   Vec3 lo(std::numeric_limits<float>::infinity()), hi(-lo);
   for (const Triangle& t : triangles)
@@ -239,7 +241,7 @@ Bounds box_around(const PlacedPart& placed, const Mesh& mesh, std::span<const Tr
       lo = glm::min(lo, p), hi = glm::max(hi, p);
     }
   Bounds box{DVec3(lo), DVec3(hi)};
-  if (placed.moved) box = moved_box(placed.part->geometry_from_mesh, box);
+  if (!placed.geometry_from_mesh.is_identity()) box = moved_box(placed.part->geometry_from_mesh, box);
   if (placed.placed) box = moved_box(placed.world_from_geometry, box);
   return box;
 }
@@ -316,7 +318,7 @@ private:
         const size_t begin = block * kBlockTriangles, end = std::min(begin + kBlockTriangles, count);
         const std::span<const Triangle> of_mesh = std::span(mesh.triangles).subspan(begin, end - begin);
         const ProbeTree::Starts near_block = tree.narrowed(tree.all(), box_around(placed, mesh, of_mesh));
-        if (near_block.count == 0) return; // most blocks
+        if (near_block.count == 0) return; // true of most blocks
         std::array<std::array<DVec3, 3>, kBlockTriangles> triangles;
         std::array<Bounds, kBlockTriangles / kGroupTriangles> boxes; // per group
         Bounds box;

@@ -16,8 +16,8 @@ PlacedParts::PlacedParts(const Scene& scene, const ScenePlan& plan, std::span<co
     for (const GeometryPart& part : geometry.parts) {
       const auto count = static_cast<uint32_t>(scene.meshes[part.mesh].triangles.size());
       if (count == 0 || (geometry.slot_class[part.slot] & 1u) != 0) continue; // bit 0: invisible to cameras
-      parts_.push_back({instance.geometry, &part, placement_of(instance), triangles_,
-                        part.geometry_from_mesh != DAffine(1.0), placement_of(instance) != DAffine(1.0),
+      parts_.push_back({instance.geometry, &part, placement_of(instance), triangles_, PartMap(part),
+                        placement_of(instance) != DAffine(1.0),
                         grids[instance.geometry].coarsest_step() * world_scale(geometry)});
       triangles_ += count;
     }

@@ -17,12 +17,12 @@ struct PlacedPart {
   const GeometryPart* part;
   DAffine world_from_geometry;
   uint32_t first_triangle;
-  bool moved;  ///< geometry_from_mesh is not the identity
-  bool placed; ///< world_from_geometry is not the identity
-  double step; ///< of the geometry's coarsest lattice, world units
+  PartMap geometry_from_mesh; ///< of `part`
+  bool placed;                ///< world_from_geometry is not the identity
+  double step;                ///< of the geometry's coarsest lattice, world units
 
   /// Geometry space position of a vertex of the mesh.
-  DVec3 in_geometry(Vec3 p) const { return moved ? transform_point(part->geometry_from_mesh, DVec3(p)) : DVec3(p); }
+  DVec3 in_geometry(Vec3 p) const { return geometry_from_mesh(p); }
   DVec3 in_world(Vec3 p) const { return placed ? transform_point(world_from_geometry, DVec3(p)) : DVec3(p); }
 };
 

@@ -15,15 +15,13 @@ void for_each_triangle(const Scene& scene, const GeometryPlan& plan, uint64_t st
   uint64_t skip = stride / 2;
   for (const GeometryPart& part : plan.parts) {
     const Mesh& mesh = scene.meshes[part.mesh];
-    const bool moved = part.geometry_from_mesh != DAffine(1.0);
+    const PartMap place(part);
     uint64_t i = skip;
     for (; i < mesh.triangles.size(); i += stride)
       per_triangle([&] {
         DTriangle corners;
-        for (size_t corner = 0; corner < 3; ++corner) {
-          const DVec3 position(mesh.positions[mesh.triangles[i][static_cast<int>(corner)]]);
-          corners[corner] = moved ? transform_point(part.geometry_from_mesh, position) : position;
-        }
+        for (size_t corner = 0; corner < 3; ++corner)
+          corners[corner] = place(mesh.positions[mesh.triangles[i][static_cast<int>(corner)]]);
         return corners;
       });
     skip = i - mesh.triangles.size();

@@ -22,19 +22,24 @@ struct GeometryPart {
   const std::vector<uint32_t>* same_path = nullptr;
 };
 
-/// Places points of a part's mesh in its geometry. Most maps are the identity, which is not computed.
+/// Transforms points of a part's mesh into geometry space. Skips the transform if it is the identity, as it is for most
+/// parts.
 class PartMap {
 public:
   /// @param part must outlive this object
   explicit PartMap(const GeometryPart& part)
-      : geometry_from_mesh_(part.geometry_from_mesh), moved_(geometry_from_mesh_ != DAffine(1.0)) {}
+      : geometry_from_mesh_(&part.geometry_from_mesh), is_identity_(*geometry_from_mesh_ == DAffine(1.0)) {}
 
-  /// Returns the same as transform_point() for finite points; the sum turns -0 into 0 as that does.
-  DVec3 operator()(Vec3 p) const { return moved_ ? transform_point(geometry_from_mesh_, DVec3(p)) : DVec3(p) + 0.0; }
+  bool is_identity() const { return is_identity_; }
+
+  /// Returns the same as transform_point() for finite points. Adding 0 turns -0 into 0, as a transform does.
+  DVec3 operator()(Vec3 p) const {
+    return is_identity_ ? DVec3(p) + 0.0 : transform_point(*geometry_from_mesh_, DVec3(p));
+  }
 
 private:
-  const DAffine& geometry_from_mesh_;
-  bool moved_;
+  const DAffine* geometry_from_mesh_;
+  bool is_identity_;
 };
 
 /// A vertex of the source: a part of the plan and a vertex of its mesh.
