@@ -71,8 +71,9 @@ inline void set_scales(const RayGroup& group, Beam& beam) {
   beam.plain = plain == (1u << kDoubleLanes) - 1;
 }
 
-/// Sets origin, inverse and limits of a beam.
-/// @param first a ray of the beam; rays of the group that are not in the beam have its inverses and an empty range of t
+/// Sets origin, inverse and limits of a beam from its group. Rays of the group that are not in the beam must have the
+/// inverses of ray `first` and an empty range of t.
+/// @param first a ray of the beam
 inline void set_bounds(const RayGroup& group, float pad_coordinate, uint32_t first, Beam& beam) {
   float reach = pad_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));

@@ -63,22 +63,24 @@ inline uint32_t approach(const TracePlacement& placement, double margin, uint32_
   return near;
 }
 
-/// Returns one component of directions turned into the grid.
+/// Returns one component of vectors that the linear part of a placement's transform maps into the grid.
 /// @param m TracePlacement::grid_from_unit
 /// @tparam kAligned the grid's axes are those of unit space: the transform only scales and translates
-template <bool kAligned>
-[[gnu::always_inline]] inline Doubles turn(const double* m, uint32_t axis, const Doubles (&v)[3]) {
+/// @tparam Number double or Doubles
+template <bool kAligned, typename Number>
+[[gnu::always_inline]] inline Number turn(const double* m, uint32_t axis, const Number (&v)[3]) {
   if constexpr (kAligned) return m[4 * axis] * v[axis];
   return m[axis] * v[0] + m[3 + axis] * v[1] + m[6 + axis] * v[2];
 }
 
+/// Sets each lane of `most` to the larger of its value and |x|.
 [[gnu::always_inline]] inline void keep_larger_magnitude(Doubles& most, const Doubles& x) {
   constexpr int64_t kMagnitude = 0x7fffffffffffffff;
   keep_larger(most, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(x) & kMagnitude));
 }
 
-/// Turns the directions of half a block of rays into the grid and scales them so that their largest components are in
-/// [1, 2). Sets direction, power and scale of `out`. Returns the largest components before they were scaled.
+/// Transforms the directions of half a block of rays into the grid and scales them so that their largest components are
+/// in [1, 2). Sets direction, power and scale of `out`. Returns the largest components before they were scaled.
 template <bool kAligned>
 [[gnu::always_inline]] inline Doubles move_directions(const TracePlacement& placement, const UnitRays& from,
                                                       uint32_t first, GridRays& out) {

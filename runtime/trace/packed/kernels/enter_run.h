@@ -2,6 +2,7 @@
 
 #include "runtime/trace/packed/kernels/beam.h"
 #include "runtime/trace/packed/kernels/enter.h"
+#include "runtime/trace/packed/kernels/prefetch.h"
 
 /// Reads and transforms runs: kGroup rays that follow each other and have one origin, tnear and octant, such as camera
 /// rays of neighbouring pixels. What their origin determines is computed once. All values are those of read_rays() and
@@ -9,17 +10,8 @@
 namespace packtrace::packed {
 namespace {
 
-/// Prefetches `bytes` bytes from `offset` on, which may lie behind the end of the array.
-/// @tparam kToWrite whether they will be written
-template <bool kToWrite>
-[[gnu::always_inline]] inline void prefetch(const void* array, size_t offset, size_t bytes) {
-  const uintptr_t begin = reinterpret_cast<uintptr_t>(array) + offset;
-  for (size_t line = 0; line < bytes; line += 64)
-    __builtin_prefetch(reinterpret_cast<const void*>(begin + line), kToWrite ? 1 : 0);
-}
-
 /// Transposes the second halves of kBlock rays that follow each other: x, y and z of the direction, and tfar.
-/// @param rows the rays' memory in order
+/// @param rows the rays' records, in the order of memory
 [[gnu::always_inline]] inline void transpose_directions(const Floats (&rows)[8], Floats (&out)[4]) {
 #if defined(__AVX512F__)
   Floats four[4]; // x, y, z and tfar of rays 4 i to 4 i + 3
@@ -73,7 +65,7 @@ inline bool read_run(const KernelRay* rays, const KernelHit* hits, UnitRays& out
   const Ints all = Ints{} - 1;
   Ints differences{}, ranges = all, every_direction[3] = {all, all, all}, any_direction[3]{};
   for (uint32_t first = 0; first < kGroup; first += kBlock) {
-    prefetch<false>(rays, (kGroup + first) * sizeof *rays, kBlock * sizeof *rays);
+    prefetch(rays, (kGroup + first) * sizeof *rays, kBlock * sizeof *rays);
     prefetch<true>(hits, first * sizeof *hits, kBlock * sizeof *hits);
     Floats rows[8], values[4];
     for (uint32_t i = 0; i < 8; ++i) {
@@ -92,7 +84,7 @@ inline bool read_run(const KernelRay* rays, const KernelHit* hits, UnitRays& out
     write_block(&out.tmax[first], end);
     ranges &= end >= rays->tnear;
   }
-  for (uint32_t axis = 0; axis < 3; ++axis) // Sign bits count, as in Traversal::octant_of().
+  for (uint32_t axis = 0; axis < 3; ++axis) // The sign bit decides, as in Traversal::octant_of(): -0 is negative.
     if (lane_bits(every_direction[axis] < 0) != kBlockLanes && lane_bits(any_direction[axis] < 0) != 0) return false;
   return (lane_bits(differences != 0) & kStarts) == 0 && lane_bits(ranges) == kBlockLanes && rays->tnear >= 0.0f;
 }
@@ -102,14 +94,13 @@ struct RunOrigin {
   float rounded[3], rest[3]; ///< rest: exact minus rounded
 };
 
-/// Returns false if the origin is so far away that it must be moved along the rays.
+/// Transforms the origin of a run into the grid. Returns false if it is so far away that it must be moved along the
+/// rays.
+template <bool kAligned>
 inline bool move_origin(const TracePlacement& placement, float max_coordinate, const UnitRays& from, RunOrigin& out) {
-  const double* m = placement.grid_from_unit;
-  const double x = double{from.origin[0][0]}, y = double{from.origin[1][0]}, z = double{from.origin[2][0]};
+  const double origin[3] = {from.origin[0][0], from.origin[1][0], from.origin[2][0]};
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    const double turned = placement.aligned != 0 ? m[4 * axis] * double{from.origin[axis][0]}
-                                                 : m[axis] * x + m[3 + axis] * y + m[6 + axis] * z;
-    const double exact = turned + m[9 + axis];
+    const double exact = turn<kAligned>(placement.grid_from_unit, axis, origin) + placement.grid_from_unit[9 + axis];
     if (!(__builtin_fabs(exact) <= kFar * double{max_coordinate})) return false;
     out.rounded[axis] = static_cast<float>(exact);
     out.rest[axis] = static_cast<float>(exact - double{out.rounded[axis]});
@@ -146,21 +137,21 @@ template <bool kAligned>
   return plain == (1u << kDoubleLanes) - 1;
 }
 
-/// Does for a run what enter() and make_beam() do. Returns false, and leaves `group` and `beam` in any state, where
-/// they must be used: the rays have different octants in the grid, are scaled unusually or start far away.
+/// Does for a run what enter() and make_beam() do. Returns false if the rays have different octants in the grid, are
+/// scaled unusually or start far away; the contents of `group` and `beam` are then unspecified, and enter() must be
+/// used.
+template <bool kAligned>
 inline bool enter_run(const TracePlacement& placement, float max_coordinate, float pad_coordinate, const UnitRays& from,
                       RayGroup& group, Beam& beam) {
   RunOrigin origin;
-  if (!move_origin(placement, max_coordinate, from, origin)) return false;
+  if (!move_origin<kAligned>(placement, max_coordinate, from, origin)) return false;
   for (uint64_t& backward : group.backward) backward = 0;
   for (uint64_t& major : group.major) major = 0;
   RayBlock block;
   for (uint32_t axis = 0; axis < 3; ++axis)
     block.origin[axis] = Floats{} + origin.rounded[axis], block.rest[axis] = Floats{} + origin.rest[axis];
   for (uint32_t first = 0; first < kGroup; first += kBlock) {
-    if (!(placement.aligned != 0 ? move_run_block<true>(placement, from, first, block, group, beam)
-                                 : move_run_block<false>(placement, from, first, block, group, beam)))
-      return false;
+    if (!move_run_block<kAligned>(placement, from, first, block, group, beam)) return false;
     set_boxes<true>(block, pad_coordinate, first, group);
     set_shears<true, true>(block, first, group);
   }
@@ -170,6 +161,12 @@ inline bool enter_run(const TracePlacement& placement, float max_coordinate, flo
   beam.plain = true;
   set_bounds(group, pad_coordinate, 0, beam);
   return true;
+}
+
+inline bool enter_run(const TracePlacement& placement, float max_coordinate, float pad_coordinate, const UnitRays& from,
+                      RayGroup& group, Beam& beam) {
+  return placement.aligned != 0 ? enter_run<true>(placement, max_coordinate, pad_coordinate, from, group, beam)
+                                : enter_run<false>(placement, max_coordinate, pad_coordinate, from, group, beam);
 }
 
 } // namespace

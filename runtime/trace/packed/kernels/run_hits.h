@@ -54,10 +54,10 @@ struct alignas(64) RunHits {
 
 private:
 #if defined(__AVX512F__)
-  /// Writes the first six rows column by column: 16 records of 24 bytes fill six cache lines.
+  /// Writes the first six rows column by column: 16 records of 24 bytes fill six registers.
   static void write_sixes(const Floats (&rows)[8], float* out) {
     for (uint32_t half = 0; half < 2; ++half) {
-      Doubles pairs[3]; // of columns 8 half to 8 half + 7
+      Doubles pairs[3]; // of rows 2 i and 2 i + 1, columns 8 half to 8 half + 7
       for (uint32_t i = 0; i < 3; ++i) {
         const Floats a = rows[2 * i], b = rows[2 * i + 1];
         pairs[i] = reinterpret_cast<Doubles>(

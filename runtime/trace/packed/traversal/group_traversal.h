@@ -4,6 +4,7 @@
 #include "runtime/trace/packed/kernels/enter_run.h"
 #include "runtime/trace/packed/kernels/group_bounds.h"
 #include "runtime/trace/packed/kernels/node_children.h"
+#include "runtime/trace/packed/kernels/prefetch.h"
 #include "runtime/trace/packed/kernels/unit_beam.h"
 #include "runtime/trace/packed/traversal/child_tests.h"
 #include "runtime/trace/packed/traversal/external_tree_search.h"
@@ -16,9 +17,8 @@
 namespace packtrace::packed {
 namespace {
 
-/// Number of cache lines of a cluster's bits to prefetch. They hold most of the 400 to 500 bytes of a cluster without
-/// normals.
-constexpr uint32_t kPrefetchedLines = 7;
+/// Number of bytes of a cluster's bits to prefetch: most of the 400 to 500 of a cluster without normals.
+constexpr size_t kPrefetchedBytes = 448;
 
 /// Finds any hits (kAny) or nearest hits of one ray class in one scene, on one thread, group by group.
 template <typename Lanes, bool kAny, bool kCount>
@@ -231,16 +231,16 @@ private:
     const float pad_coordinate = (graded_ ? kMinTopPad : 1.0f) * tree.max_coordinate;
     Beam beam;
     if (!kAny && unit_.one_origin && scene_.search_tree == nullptr) {
-      if (is_run_ && rays == ~uint64_t{0} &&
-          enter_run(place, tree.max_coordinate, pad_coordinate, unit_, group, beam)) {
-        group.beam = &beam;
-      } else {
+      bool is_beam =
+          is_run_ && rays == ~uint64_t{0} && enter_run(place, tree.max_coordinate, pad_coordinate, unit_, group, beam);
+      if (!is_beam) {
         rays = enter<true, true>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
-        if (make_beam(group, pad_coordinate, rays, beam))
-          group.beam = &beam;
-        else
-          fill_records(group);
+        is_beam = make_beam(group, pad_coordinate, rays, beam);
       }
+      if (is_beam)
+        group.beam = &beam;
+      else
+        fill_records(group);
     } else {
       rays = enter<!kAny>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
     }
@@ -271,7 +271,8 @@ private:
       count_node(active);
       if ((node.ray_classes & ray_class_) == 0) continue;
       const NodeChildren children(node);
-      if (!children.leaves()) prefetch_siblings(nodes + node.first_child);
+      // All children, before their boxes are tested, because the first child is read right after that.
+      if (!children.leaves()) prefetch(nodes + node.first_child, 0, baked::kNodeWidth * sizeof node);
       typename Lanes::Boxes boxes(node, octant);
       if constexpr (kGraded) enlarge_boxes(node, octant, boxes);
       if (children.leaves())
@@ -280,12 +281,6 @@ private:
         Tests::push_children(boxes, group, active, children.slots(), stack, size,
                              [&](uint32_t slot) { return node.first_child + slot; });
     }
-  }
-
-  /// Prefetches all children of a node before their boxes are tested, because the first child is read right after that.
-  static void prefetch_siblings(const baked::PackedNode* first) {
-    const auto begin = reinterpret_cast<uintptr_t>(first), end = begin + baked::kNodeWidth * sizeof *first;
-    for (uintptr_t line = begin; line < end; line += 64) __builtin_prefetch(reinterpret_cast<const void*>(line));
   }
 
   void count_node(uint64_t rays) {
@@ -301,8 +296,7 @@ private:
   void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
                     const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
     // Without the prefetch, decoding waits longer for them than it takes.
-    const uint8_t* const bits = scene_.clusters[node.cluster].bits;
-    for (uint32_t line = 0; line < kPrefetchedLines; ++line) __builtin_prefetch(bits + 64 * line);
+    prefetch(scene_.clusters[node.cluster].bits, 0, kPrefetchedBytes);
     if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
     uint64_t by_child[baked::kNodeWidth];
     float t[baked::kNodeWidth];

@@ -7,7 +7,7 @@ namespace packtrace::packed {
 namespace {
 
 /// Distance at which rays are prefetched while others are sorted.
-constexpr uintptr_t kBytesAhead = 96 * sizeof(KernelRay);
+constexpr size_t kBytesAhead = 96 * sizeof(KernelRay);
 
 /// Sorts rays by octant into groups of neighbours and traces the groups.
 template <typename Lanes, bool kAny, bool kCount>
@@ -54,7 +54,7 @@ private:
   [[gnu::always_inline]] void sort(size_t begin, size_t end, uint32_t (&numbers)[8][kGroup], uint32_t (&sizes)[8]) {
     for (size_t i = begin; i < end; ++i) {
       const auto number = static_cast<uint32_t>(i);
-      __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<uintptr_t>(rays_ + i) + kBytesAhead));
+      prefetch(rays_ + i, kBytesAhead, sizeof *rays_);
       if constexpr (kCount) ++counters_->rays;
       if constexpr (kAny)
         occluded_[i] = 0;
