@@ -74,8 +74,9 @@ void read_lod(const BakedFile& file, uint32_t geometry) {
   const LodView lod = file.lod(geometry);
   std::vector<uint32_t> above(lod.groups.size(), baked::kNoLodGroup); // a group made from this one
   for (size_t level = 0; level < lod.levels.size(); ++level) {
-    require(lod.links_of(level).size() == file.clusters(lod.levels[level].geometry).size(), "number of links");
-    for (const LodLink& link : lod.links_of(level)) {
+    const std::vector<LodLink> links = lod.links_of(level);
+    require(links.size() == file.clusters(lod.levels[level].geometry).size(), "number of links");
+    for (const LodLink& link : links) {
       require(link.group < lod.groups.size() && lod.groups[link.group].level == level, "group of a cluster");
       if (link.generating_group != baked::kNoLodGroup) above[link.generating_group] = link.group;
     }

@@ -94,8 +94,9 @@ TEST_P(LodFileOf, LevelsAreHonest) {
 TEST_P(LodFileOf, SpheresHoldThoseBelowInFloatToo) {
   for (size_t level = 0; level < view_.levels.size(); ++level) {
     const uint32_t geometry = view_.levels[level].geometry;
-    for (uint32_t c = 0; c < view_.links_of(level).size(); ++c) {
-      const LodLink link = view_.links_of(level)[c];
+    const std::vector<LodLink> links = view_.links_of(level);
+    for (uint32_t c = 0; c < links.size(); ++c) {
+      const LodLink& link = links[c];
       const baked::LodGroupRecord& outer = view_.groups[link.group];
       const auto center = [](const baked::LodGroupRecord& g) { return Vec3(g.center[0], g.center[1], g.center[2]); };
       if (level > 0) {

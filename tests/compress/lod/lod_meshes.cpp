@@ -275,9 +275,10 @@ ClusterLod read_lod(const BakedFile& file, uint32_t geometry) {
   std::map<LatticePoint, uint32_t> numbers;
   for (uint32_t level = 0; level < lod.level_count; ++level) {
     const uint32_t of_level = view.levels[level].geometry;
+    const std::vector<LodLink> links = view.links_of(level);
     for (uint32_t c = 0; c < file.clusters(of_level).size(); ++c) {
       const ClusterView cluster = file.cluster(of_level, c);
-      const LodLink link = view.links_of(level)[c];
+      const LodLink& link = links[c];
       const auto first_vertex = static_cast<uint32_t>(lod.vertices.size());
       lod.clusters.push_back({{static_cast<uint32_t>(lod.triangles.size()), cluster.triangle_count(), 0},
                               level,

@@ -38,13 +38,15 @@ inline void put_cut(Dump& out, const BakedFile& file, uint32_t geometry) {
   const float threshold = 0.7f * lod.levels[lod.levels.size() / 2].error;
   out.put(std::span<const float>(&threshold, 1));
   std::vector<uint32_t> cut;
-  for (size_t level = 0; level < lod.levels.size(); ++level)
-    for (uint32_t c = 0; c < lod.links_of(level).size(); ++c) {
-      const LodLink link = lod.links_of(level)[c];
+  for (size_t level = 0; level < lod.levels.size(); ++level) {
+    const std::vector<LodLink> links = lod.links_of(level);
+    for (uint32_t c = 0; c < links.size(); ++c) {
+      const LodLink& link = links[c];
       const float made = link.generating_group == baked::kNoLodGroup ? 0.0f : lod.groups[link.generating_group].error;
       if (lod.groups[link.group].error > threshold && made <= threshold)
         cut.insert(cut.end(), {lod.levels[level].geometry, c});
     }
+  }
   out.put_number(static_cast<uint32_t>(cut.size() / 2));
   out.put(cut);
 }
