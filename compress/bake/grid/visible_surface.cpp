@@ -28,10 +28,11 @@ struct ImagePoint {
 
 using ImageTriangle = std::array<ImagePoint, 3>;
 
-/// The smallest and the largest of three values, without branches; all are finite or the triangle is left out.
 struct Range {
   double low, high;
 };
+
+/// Returns the smallest and the largest of three finite values, without branches.
 Range range_of(double a, double b, double c) { return {std::min(std::min(a, b), c), std::max(std::max(a, b), c)}; }
 
 class VisiblePointFinder {

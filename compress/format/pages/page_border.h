@@ -59,7 +59,7 @@ struct PageTriangles {
 
   void clear() { count_ = 0; }
 
-  /// Adds three corners, without others across. Returns the first.
+  /// Adds a triangle whose edges have no corners across yet. Returns its first corner.
   uint32_t add(const std::array<uint32_t, 3>& corners) {
     const uint32_t first = count_;
     count_ += 3;
@@ -69,7 +69,7 @@ struct PageTriangles {
   }
 
 private:
-  uint32_t count_ = 0; // at most the vectors' sizes
+  uint32_t count_ = 0; // number of corners; the vectors may be longer
 };
 
 /// Adds a triangle to the page and to its border: edges close edges of the border or become part of it.

@@ -51,7 +51,8 @@ public:
 
   /// Returns the point to code next: of those of the highest rank that are not known, the first.
   uint32_t next() const {
-    // The maximum is that of floats, whose order is that of their bits. Known points are negative.
+    // Keys are compared as floats: positive floats have the order of their bits, and SSE2 has a maximum for floats
+    // only. Keys of known points are negative.
     std::array<Floats, kKeysPerStep / 4> best{}, some;
     for (uint32_t i = 0; i < count_; i += kKeysPerStep) {
       std::memcpy(&some, keys_.data() + i, sizeof some);
@@ -93,11 +94,14 @@ private:
   static Floats larger(Floats a, Floats b) { return a > b ? a : b; }
 
   static constexpr uint32_t kMaxCorners = 3 * kMaxClusterTriangles, kKeysPerStep = 16;
-  static constexpr uint32_t kOld = kMaxClusterVertices; // points of other clusters: kOld + their corner
-  static constexpr uint32_t kNobody = kOld + 3;
-  static constexpr uint32_t kOldCorner = kMaxCorners, kNoCorner = kMaxCorners + 1; // of other clusters; none
-  static constexpr int32_t kKnown = -(1 << 30); // stays negative, whatever its corners add
-  static constexpr int32_t kFirstKey = 1 << 23; // from here on, keys are the bits of normal floats
+  // Numbers of points within the cluster. Points of other clusters have kOld, kOld + 1 or kOld + 2 as first, second or
+  // third corner of a triangle: one counter for all would be a chain of additions that wait for each other.
+  static constexpr uint32_t kOld = kMaxClusterVertices;
+  static constexpr uint32_t kNobody = kOld + 3; ///< point of kNoCorner
+  // Numbers of corners that lie across an edge: one of another cluster, and none.
+  static constexpr uint32_t kOldCorner = kMaxCorners, kNoCorner = kMaxCorners + 1;
+  static constexpr int32_t kKnown = -(1 << 30); ///< key of a known point; stays negative, whatever its corners add
+  static constexpr int32_t kFirstKey = 1 << 23; ///< keys are at least this large, so they are the bits of normal floats
 
   // State of a corner: how many of the two other points are known, and whether the point across their edge is.
   static constexpr uint32_t kBoth = 2, kAcross = 4;
@@ -119,24 +123,25 @@ private:
     return neighbours;
   }();
 
-  /// Copies the points of the cluster's corners and what lies across, as numbers within the cluster, and counts
-  /// corners.
+  /// Copies the points and the corners across of the cluster's corners, as numbers within the cluster, and counts each
+  /// point's corners.
   void copy_corners(const PageTriangles& triangles, uint32_t corners) {
     const uint32_t *points = triangles.points.data() + first_corner_, *across = triangles.across.data() + first_corner_;
     ends_.fill(0);
-    // Numbers of older points wrap. These have three places, because counts of one place wait for each other.
     for (uint32_t t = 0; t < corners; t += 3)
       for (uint32_t i = 0; i < 3; ++i) {
         const uint32_t c = t + i, own = across[c] - first_corner_;
-        points_[c] = static_cast<uint16_t>(std::min(points[c] - first_point_, kOld + i));
+        points_[c] = static_cast<uint16_t>(std::min(points[c] - first_point_, kOld + i)); // older points wrap
         ++ends_[points_[c]];
         across_[c] = static_cast<uint16_t>(own < corners ? own : across[c] == kNoPageCorner ? kNoCorner : kOldCorner);
       }
     points_[kOldCorner] = kOld, points_[kNoCorner] = kNobody;
   }
 
+  /// Returns 1 if a corner's point is of another cluster, else 0.
   uint32_t is_old(uint32_t c) const { return points_[c] >= kOld && points_[c] < kNobody ? 1 : 0; }
 
+  /// @param old how many of the two other points of the corner's triangle are of other clusters
   void add_corner(uint32_t c, uint32_t old) {
     const uint32_t state = old + is_old(across_[c]) * kAcross, point = points_[c];
     states_[c] = static_cast<uint8_t>(state);
@@ -145,7 +150,7 @@ private:
   }
 
   void advance(uint32_t corner, uint32_t by) {
-    const uint32_t before = states_[corner], now = (before + by) % 8; // the remainder matters only where there is none
+    const uint32_t before = states_[corner], now = (before + by) % 8; // only kNoCorner reaches 8
     keys_[points_[corner]] += kShares[now] - kShares[before];
     states_[corner] = static_cast<uint8_t>(now);
   }

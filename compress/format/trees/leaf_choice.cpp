@@ -50,7 +50,8 @@ private:
     static_assert(kWidth == 8);
     const Float4 none = Float4{} + kInfinity;
     Float4 low = load_lanes(out.leaf_cost), high = load_lanes(out.leaf_cost + 4);
-    // Costs of the right side as at most i - k leaves; in registers, because loads across two stores wait for both.
+    // Lane i - 1: cost of the right side as at most i - k leaves. Registers are shifted, because a load that overlaps
+    // two recent stores waits until both have reached the cache.
     Float4 right_low = load_lanes(right.leaf_cost), right_high = load_lanes(right.leaf_cost + 4);
     for (uint32_t k = 1; k < kWidth; ++k) {
       right_high = __builtin_shufflevector(right_low, right_high, 3, 4, 5, 6);
