@@ -5,6 +5,11 @@
 #include <sys/mman.h>
 
 namespace packtrace {
+namespace {
+
+constexpr size_t kHeapBlock = 24u << 20; // larger ones might be mapped separately
+
+} // namespace
 
 void prefer_large_pages(void* memory, size_t bytes) {
   constexpr uintptr_t kLargePage = 2u << 20;
@@ -16,20 +21,24 @@ void prefer_large_pages(void* memory, size_t bytes) {
   (void)::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 }
 
-/// Allocates a large block and frees it untouched: malloc keeps the block and serves small allocations from it. glibc
-/// first maps a large block separately, but after such a block is freed it serves sizes up to 32 MiB from its heap;
-/// hence two rounds. Other malloc implementations may return both blocks to the system, which is harmless.
+/// Allocates large blocks and frees them untouched: malloc keeps them and serves other allocations from them.
+void prefer_large_heap_pages(size_t bytes) {
+  std::vector<void*> blocks((bytes + kHeapBlock - 1) / kHeapBlock);
+  for (void*& block : blocks) {
+    block = std::malloc(kHeapBlock);
+    prefer_large_pages(block, kHeapBlock);
+  }
+  for (void* const block : blocks) std::free(block);
+}
+
+/// glibc first maps a large block separately, but after such a block is freed it serves sizes up to 32 MiB from its
+/// heap; hence two rounds. Other malloc implementations may return both blocks to the system, which is harmless.
 /// Source: the GNU C library's manual, mallopt(3), M_MMAP_THRESHOLD.
 void LargeHeapPages::prepare() {
-  constexpr size_t kBlock = 24u << 20;
-  // Less than kBlock, because other allocations use the block as well. Small steps would not work: malloc's bookkeeping
-  // behind each block touches a large page.
+  // Less than a block, because other allocations use the block as well. Small steps would not work: malloc's
+  // bookkeeping behind each block touches a large page.
   constexpr uint64_t kStep = 16u << 20;
-  for (int time = 0; time < 2; ++time) {
-    void* const block = std::malloc(kBlock);
-    prefer_large_pages(block, kBlock);
-    std::free(block);
-  }
+  for (int time = 0; time < 2; ++time) prefer_large_heap_pages(kHeapBlock);
   next_ = allocated_ + kStep;
 }
 

@@ -1,5 +1,6 @@
 #include "pbrt_import/base/large_pages.h"
 
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -43,6 +44,16 @@ TEST(LargePages, BlocksKeepWhatIsWrittenToThem) {
     ASSERT_EQ(blocks[i].front(), i);
     ASSERT_EQ(blocks[i].back(), i);
   }
+}
+
+TEST(LargePages, TheHeapServesBlocksAfterItIsPrepared) {
+  std::vector<std::vector<uint32_t>> blocks;
+  for (uint32_t i = 0; i < 100; ++i) { // 100 MB in total: more than was prepared
+    if (i % 50 == 0) prefer_large_heap_pages(size_t{30} << 20);
+    blocks.emplace_back(size_t{250'000}, i);
+  }
+  for (uint32_t i = 0; i < blocks.size(); ++i)
+    ASSERT_EQ(std::count(blocks[i].begin(), blocks[i].end(), i), 250'000) << i;
 }
 
 } // namespace
