@@ -3,10 +3,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "compress/format/cluster/normal_packing.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -52,6 +55,25 @@ TEST_P(NormalCodec, CodesSplitAndJoin) {
     ASSERT_TRUE(fields.x >= 0 && fields.x < static_cast<int32_t>(format().x_codes));
     ASSERT_TRUE(fields.y >= 0 && fields.y < static_cast<int32_t>(format().y_codes));
     ASSERT_EQ(join_normal_code(encoding(), fields), code);
+  }
+}
+
+TEST_P(NormalCodec,
+       TheNarrowestPackingIsThatOfAllNormals) { // although only the corners of each chart's range are tried
+  test::Random random(21);
+  for (int round = 0; round < 3000; ++round) {
+    // Normals around one direction, in any part of the sphere that up to three charts share.
+    const DVec3 centre = random_direction(random);
+    const double spread = std::exp2(-static_cast<double>(random.bits() % 12u));
+    std::vector<NormalFields> fields(1 + random.bits() % 40u);
+    for (NormalFields& one : fields)
+      one = split_normal_code(encoding(), encode_normal(encoding(), centre + spread * random_direction(random)));
+    std::optional<NormalPacking> best;
+    for (uint32_t chart = 0; chart <= format().charts; ++chart)
+      if (const auto packing = pack_normals(encoding(), fields, chart); packing)
+        if (!best || packing->stride() < best->stride()) best = packing;
+    ASSERT_TRUE(best);
+    ASSERT_EQ(choose_normal_packing(encoding(), fields), *best) << round;
   }
 }
 

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cassert>
 #include <limits>
+#include <vector>
 
 #include "compress/format/cluster/cluster_codec.h"
 #include "compress/format/cluster/normal_packing.h"
@@ -26,31 +28,50 @@ void write_positions(const ClusterInput& input, baked::ClusterRecord& record, Bi
       writer.put(static_cast<uint64_t>(p[axis] - base[axis]), record.position_bits[axis]);
 }
 
+/// Number of distinct codes of a cluster's vertices.
+size_t count_distinct(std::span<const uint32_t> codes) {
+  constexpr uint32_t kSlotBits = 9; // twice as many slots as codes
+  static_assert(kMaxClusterVertices <= 1u << (kSlotBits - 1));
+  constexpr uint32_t kSlots = 1u << kSlotBits;
+  std::array<uint16_t, kSlots> first{}; // 1 + the place of the first of equal codes, 0 for none
+  size_t distinct = 0;
+  for (size_t i = 0; i < codes.size(); ++i) {
+    uint32_t slot = (codes[i] * 0x9e3779b1u) >> (32 - kSlotBits);
+    while (first[slot] != 0 && codes[first[slot] - 1u] != codes[i]) slot = (slot + 1) % kSlots;
+    if (first[slot] != 0) continue;
+    first[slot] = static_cast<uint16_t>(i + 1);
+    ++distinct;
+  }
+  return distinct;
+}
+
 void write_normals(const ClusterInput& input, baked::ClusterRecord& record, BitWriter& writer) {
   const std::span<const uint32_t> codes = input.normal_codes;
   if (codes.empty()) return;
   const NormalEncoding encoding = input.normal_encoding;
-  std::vector<uint32_t> palette(codes.begin(), codes.end());
-  std::sort(palette.begin(), palette.end());
-  palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
   std::vector<NormalFields> fields;
-  for (const uint32_t code : palette) fields.push_back(split_normal_code(encoding, code));
+  fields.reserve(codes.size());
+  for (const uint32_t code : codes) fields.push_back(split_normal_code(encoding, code));
   const NormalPacking packing = choose_normal_packing(encoding, fields);
 
   record.flags = static_cast<uint8_t>(baked::kClusterHasNormals | (packing.chart << baked::kClusterChartShift) |
                                       (packing.mixed_charts ? baked::kClusterMixedCharts : 0));
   record.normal_anchor = packing.anchor;
   record.normal_bits = packing.bits;
-  const uint32_t stride = packing.stride(), entry_bits = bits_for_count(palette.size());
+  const size_t distinct = count_distinct(codes);
+  const uint32_t stride = packing.stride(), entry_bits = bits_for_count(distinct);
   const auto put = [&](NormalFields normal) { writer.put(packed_normal(encoding, packing, normal), stride); };
-  if (palette.size() * stride + codes.size() * entry_bits < codes.size() * stride) {
-    record.normal_palette = static_cast<uint16_t>(palette.size());
-    for (const NormalFields& normal : fields) put(normal);
+  if (distinct * stride + codes.size() * entry_bits < codes.size() * stride) {
+    std::vector<uint32_t> palette(codes.begin(), codes.end());
+    std::sort(palette.begin(), palette.end());
+    palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
+    record.normal_palette = static_cast<uint16_t>(distinct);
+    for (const uint32_t code : palette) put(split_normal_code(encoding, code));
     for (const uint32_t code : codes)
       writer.put(static_cast<uint64_t>(std::lower_bound(palette.begin(), palette.end(), code) - palette.begin()),
                  entry_bits);
   } else {
-    for (const uint32_t code : codes) put(split_normal_code(encoding, code));
+    for (const NormalFields& normal : fields) put(normal);
   }
 }
 

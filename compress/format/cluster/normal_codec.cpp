@@ -8,6 +8,11 @@
 namespace packtrace {
 namespace {
 
+using Double2 = double __attribute__((vector_size(16)));
+using Double4 = double __attribute__((vector_size(32)));
+using Float4 = float __attribute__((vector_size(16)));
+using Int4 = int32_t __attribute__((vector_size(16)));
+
 int32_t last_x(const NormalFormat& format) { return static_cast<int32_t>(format.x_codes) - 1; }
 int32_t last_y(const NormalFormat& format) { return static_cast<int32_t>(format.y_codes) - 1; }
 
@@ -23,11 +28,15 @@ Vec3 decode_zsign(NormalFields fields) {
   return {x, y, fields.chart != 0 ? -z : z};
 }
 
-/// @param t twice the code's distance from the middle code, divided by the number of steps: -1 .. 1
-float warp(float t) { return t * (static_cast<float>(kAxisSlope) + static_cast<float>(kAxisCubic) * (t * t)); }
+/// @param t twice the code's distance from the middle code, divided by the number of steps: -1 .. 1; one or a vector
+template <class T>
+T warp(T t) {
+  return t * (static_cast<float>(kAxisSlope) + static_cast<float>(kAxisCubic) * (t * t));
+}
 
-double inverse_warp(double x) {
-  double t = x * 1.4142135623730951;
+/// Works on each lane.
+Double2 inverse_warp(Double2 x) {
+  Double2 t = x * 1.4142135623730951;
   for (int i = 0; i < 3; ++i) // Newton's method: the first guess is within 0.04, and each step about squares the error
     t -= (t * (kAxisSlope + kAxisCubic * t * t) - x) / (kAxisSlope + 3.0 * kAxisCubic * t * t);
   return t;
@@ -109,15 +118,32 @@ void search_axis(Nearest& nearest, int32_t last, DVec3 n) {
   int axis = 0;
   for (int other = 1; other < 3; ++other)
     if (std::abs(n[other]) > std::abs(n[axis])) axis = other;
-  const int32_t x = code_below(inverse_warp(n[(axis + 1) % 3]), last);
-  const int32_t y = code_below(inverse_warp(n[(axis + 2) % 3]), last);
+  const int u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+  const Double2 t = inverse_warp(Double2{n[u_axis], n[v_axis]});
+  const int32_t x = code_below(t[0], last), y = code_below(t[1], last);
   const auto chart = static_cast<uint32_t>(2 * axis) + (n[axis] < 0.0 ? 1u : 0u);
-  const std::array<float, 2> v{axis_component(y, last), axis_component(y + 1, last)};
-  for (int32_t i = 0; i < 2; ++i) {
-    const float u = axis_component(x + i, last);
-    nearest.try_code({chart, x + i, y}, axis_normal(chart, u, v[0]));
-    nearest.try_code({chart, x + i, y + 1}, axis_normal(chart, u, v[1]));
-  }
+  // Lanes: the codes (x, y), (x, y + 1), (x + 1, y) and (x + 1, y + 1), decoded as by axis_normal().
+  const Float4 parts =
+      warp(__builtin_convertvector(2 * Int4{x, x + 1, y, y + 1} - last, Float4) * (1.0f / static_cast<float>(last)));
+  const Float4 u = __builtin_shufflevector(parts, parts, 0, 0, 1, 1),
+               v = __builtin_shufflevector(parts, parts, 2, 3, 2, 3);
+  const Float4 square = 1.0f - (u * u + v * v);
+  Float4 w;
+  for (int i = 0; i < 4; ++i) w[i] = std::sqrt(std::max(square[i], 0.0f));
+  if (n[axis] < 0.0) w = -w;
+  std::array<Double4, 3> squares; // of the chord, as in Nearest
+  const auto put_square = [&](int along, Float4 component) {
+    const Double4 d = __builtin_convertvector(component, Double4) - n[along];
+    squares[static_cast<size_t>(along)] = d * d;
+  };
+  put_square(axis, w), put_square(u_axis, u), put_square(v_axis, v);
+  const Double4 distances = squares[0] + squares[1] + squares[2];
+  int best = 0;
+  for (int i = 1; i < 4; ++i)
+    if (distances[i] < distances[best]) best = i;
+  Vec3 decoded;
+  decoded[axis] = w[best], decoded[u_axis] = u[best], decoded[v_axis] = v[best];
+  nearest.try_code({chart, x + best / 2, y + best % 2}, decoded);
 }
 
 void search_oct(Nearest& nearest, int32_t last, DVec3 n) {

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cassert>
 #include <limits>
+#include <vector>
 
 #include "compress/format/layout/bit_stream.h"
 
@@ -17,6 +18,20 @@ struct Range {
   int32_t anchor() const { return lo >> 1; } // floor
   uint8_t bits() const { return static_cast<uint8_t>(std::bit_width(static_cast<uint32_t>(hi - 2 * anchor()))); }
 };
+
+/// Opposite corners of the range of the normals of each chart. unfold_normal() keeps or swaps x and y and maps each
+/// monotonically, so that the corners have the range of all.
+std::vector<NormalFields> chart_corners(std::span<const NormalFields> fields) {
+  constexpr uint32_t kMaxCharts = 6;
+  std::array<Range, kMaxCharts> x, y;
+  for (const NormalFields& one : fields) x[one.chart].add(one.x), y[one.chart].add(one.y);
+  std::vector<NormalFields> corners;
+  corners.reserve(2 * kMaxCharts);
+  for (uint32_t chart = 0; chart < kMaxCharts; ++chart)
+    if (x[chart].lo <= x[chart].hi)
+      corners.push_back({chart, x[chart].lo, y[chart].lo}), corners.push_back({chart, x[chart].hi, y[chart].hi});
+  return corners;
+}
 
 } // namespace
 
@@ -39,9 +54,10 @@ std::optional<NormalPacking> pack_normals(NormalEncoding encoding, std::span<con
 }
 
 NormalPacking choose_normal_packing(NormalEncoding encoding, std::span<const NormalFields> fields) {
+  const std::vector<NormalFields> corners = chart_corners(fields);
   std::optional<NormalPacking> best;
   for (uint32_t chart = 0; chart <= format_of(encoding).charts; ++chart) {
-    const std::optional<NormalPacking> packing = pack_normals(encoding, fields, chart);
+    const std::optional<NormalPacking> packing = pack_normals(encoding, corners, chart);
     if (packing && (!best || packing->stride() < best->stride())) best = packing;
   }
   assert(best);

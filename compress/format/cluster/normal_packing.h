@@ -18,6 +18,7 @@ struct NormalPacking {
   uint32_t chart_bits = 0;         ///< 0 unless mixed
 
   uint32_t stride() const { return uint32_t{bits[0]} + bits[1] + chart_bits; } ///< bits per normal
+  bool operator==(const NormalPacking&) const = default;
 };
 
 /// Returns the narrowest packing of `fields` unfolded around `chart`, or with a chart per normal if chart ==
