@@ -52,6 +52,8 @@ public:
     choose_flat_triangles(parts);
     out_.normal_encoding = config_.normals ? *config_.normals : choose_normal_encoding(parts, limits_.error_degrees);
     CoincidingTriangles coinciding(source_, count_merged());
+    out_.vertices.reserve(surface_.positions.size());
+    out_.triangles.reserve(surface_.corners.size()), out_.kind_of.reserve(surface_.corners.size());
     for (size_t i = 0; i < parts.size(); ++i) {
       encode_normals(out_.normal_encoding, parts[i], out_.stats);
       weld(i, parts[i], coinciding);

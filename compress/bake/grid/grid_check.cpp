@@ -24,6 +24,7 @@ GridCheck check_grid(const GeometryView& view, const GeometryGrid& grid) {
   const double step = grid.grid.step();
   const bool seen = view.best.pixels > 0.0;
   std::vector<std::pair<double, double>> tilts; // degrees, weight
+  tilts.reserve(view.sample.size());
   double total = 0.0, collapsed = 0.0, kept = 0.0;
   for (size_t i = 0; i < view.sample.size(); ++i) {
     const SampleTriangle& t = view.sample[i];

@@ -1,6 +1,7 @@
 #include "compress/bake/grid/outline_share.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <numeric>
@@ -20,9 +21,9 @@ constexpr int kBucketBits = 10;
 /// A triangle's edge at a sampled position.
 struct StarEdge {
   uint64_t centre, end; ///< position_key()
-  bool outgoing;        ///< the triangle's winding runs from the centre to the end
   double length;
-  DVec3 normal; ///< unit normal of the triangle
+  uint32_t triangle; ///< number among the triangles at sampled positions
+  bool outgoing;     ///< the triangle's winding runs from the centre to the end
 };
 
 class Stars {
@@ -39,11 +40,16 @@ public:
       const DTriangle corners{place(t.x), place(t.y), place(t.z)};
       const DVec3 cross = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
       if (!(glm::length(cross) > 0.0)) continue;
-      const DVec3 normal = glm::normalize(cross) * (part.flip ? -1.0 : 1.0);
+      const auto triangle = static_cast<uint32_t>(normals_.size());
+      normals_.push_back(glm::normalize(cross) * (part.flip ? -1.0 : 1.0));
+      const std::array<uint64_t, 3> keys{position_key(corners[0]), position_key(corners[1]), position_key(corners[2])};
+      const auto add_edge = [&](size_t centre, size_t end, bool outgoing) {
+        edges_.push_back({keys[centre], keys[end], glm::distance(corners[centre], corners[end]), triangle, outgoing});
+      };
       for (size_t i = 0; i < 3; ++i) {
         if (!chosen[t[static_cast<int>(i)]]) continue;
-        add_edge(corners[i], corners[(i + 1) % 3], !part.flip, normal);
-        add_edge(corners[i], corners[(i + 2) % 3], part.flip, normal);
+        add_edge(i, (i + 1) % 3, !part.flip);
+        add_edge(i, (i + 2) % 3, part.flip);
       }
     }
   }
@@ -57,7 +63,8 @@ public:
       double share = 1.0;
       if (end - begin > 1) {
         const StarEdge& last = edges_[end - 1]; // in the opposite direction if both triangles have the same winding
-        share = angle_degrees(first.normal, first.outgoing != last.outgoing ? last.normal : -last.normal) / 180.0;
+        const DVec3 &normal = normals_[first.triangle], &other = normals_[last.triangle];
+        share = angle_degrees(normal, first.outgoing != last.outgoing ? other : -other) / 180.0;
       }
       outline += share * first.length;
       all += first.length;
@@ -82,12 +89,9 @@ private:
       });
   }
 
-  void add_edge(DVec3 centre, DVec3 end, bool outgoing, DVec3 normal) {
-    edges_.push_back({position_key(centre), position_key(end), outgoing, glm::distance(centre, end), normal});
-  }
-
   uint64_t mask_;
   std::vector<StarEdge> edges_;
+  std::vector<DVec3> normals_; // unit normals of the triangles at sampled positions
 };
 
 } // namespace

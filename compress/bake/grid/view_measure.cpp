@@ -28,7 +28,8 @@ bool is_in_front(const PrimaryCamera& camera, DVec3 world) {
 
 class TriangleProjector {
 public:
-  TriangleProjector(const PrimaryCamera& camera, ViewSums& sums) : camera_(camera), sums_(sums) {}
+  TriangleProjector(const PrimaryCamera& camera, ViewSums& sums)
+      : camera_(camera), sums_(sums), spread_(camera.pixel_spread()) {}
 
   /// @return the pixels that the triangle covers, without the weight
   double add(const DTriangle& world, double weight) {
@@ -39,12 +40,14 @@ public:
   }
 
 private:
-  bool in_view_depth(DVec3 world) const { return is_in_front(camera_, world); }
+  /// is_in_front() of a point in homogeneous pixel coordinates.
+  bool in_view_depth(DVec3 seen) const {
+    return camera_.projection() != Projection::kPerspective || seen.z * camera_.depth_scale() > 0.0;
+  }
 
   /// World-space size of a pixel at a point in front of the camera.
   double pixel_at(DVec3 world) const {
-    const double spread = camera_.pixel_spread();
-    return camera_.projection() == Projection::kOrthographic ? spread : spread * camera_.view_z(world);
+    return camera_.projection() == Projection::kOrthographic ? spread_ : spread_ * camera_.view_z(world);
   }
 
   double take(const DTriangle& piece, double pixels) {
@@ -62,7 +65,8 @@ private:
     const std::array<DVec3, 3> seen{camera_.homogeneous_pixel(t[0]), camera_.homogeneous_pixel(t[1]),
                                     camera_.homogeneous_pixel(t[2])};
     if (outside(seen, camera_.size())) return 0.0;
-    if (!(in_view_depth(t[0]) && in_view_depth(t[1]) && in_view_depth(t[2]))) return last ? 0.0 : halve(t, cuts);
+    if (!(in_view_depth(seen[0]) && in_view_depth(seen[1]) && in_view_depth(seen[2])))
+      return last ? 0.0 : halve(t, cuts);
     const glm::dvec2 a = glm::dvec2(seen[0]) / seen[0].z, b = glm::dvec2(seen[1]) / seen[1].z,
                      c = glm::dvec2(seen[2]) / seen[2].z;
     const glm::dvec2 sides = glm::max(glm::max(a, b), c) - glm::min(glm::min(a, b), c);
@@ -93,6 +97,7 @@ private:
 
   const PrimaryCamera& camera_;
   ViewSums& sums_;
+  const double spread_; // PrimaryCamera::pixel_spread()
   const DTriangle* whole_ = nullptr;
   std::optional<double> height_; // of the whole triangle
   double weight_ = 1.0;
@@ -188,12 +193,15 @@ void add_geometry_view(const PrimaryCamera& camera, std::span<const SampleTriang
   const size_t stride = std::max<size_t>(1, chosen.size() * sample.size() / kMaxPlacedTriangles);
   for (size_t k = 0; k < chosen.size(); ++k) {
     const DAffine placement = placements[chosen[k].instance];
+    const bool placed = placement != DAffine(1.0);
     for (size_t i = k % stride; i < sample.size(); i += stride) {
       const double weight = sample[i].weight * chosen[k].weight * static_cast<double>(stride);
       const DTriangle& t = sample[i].corners;
-      const double pixels = look.add(
-          {transform_point(placement, t[0]), transform_point(placement, t[1]), transform_point(placement, t[2])},
-          weight);
+      const double pixels =
+          look.add(placed ? DTriangle{transform_point(placement, t[0]), transform_point(placement, t[1]),
+                                      transform_point(placement, t[2])}
+                          : t,
+                   weight);
       sample_pixels[i] += pixels * weight;
     }
   }

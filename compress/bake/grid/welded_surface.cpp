@@ -20,6 +20,8 @@ public:
   SurfaceWelder(const Scene& scene, const GeometryPlan& plan, std::span<const LatticePart> parts)
       : plan_(plan), source_(scene, plan), parts_(parts), table_(count(parts, &LatticePart::points)) {
     out_.corners.reserve(count(parts, &LatticePart::triangles));
+    const size_t points = count(parts, &LatticePart::points);
+    out_.positions.reserve(points), out_.merged.reserve(points), out_.sources.reserve(points);
   }
 
   WeldedSurface run() {
