@@ -35,6 +35,7 @@ struct Options {
   std::vector<uint32_t> threads{1, 2};
   uint32_t repeats = 5;
   bool cpu_clock = false;
+  std::string embree_device; ///< configuration of rtcNewDevice()
   std::optional<double> max_mismatches;
   std::vector<double> scales;
   bool growth = false;
@@ -151,7 +152,7 @@ void check_mismatches(const Json& rows, const Systems& systems, double most) {
 
 Json measure_input(const std::string& name, const Options& options) {
   const std::unique_ptr<TraceInput> input = load_trace_input(name, options.inputs);
-  Systems systems = make_systems(*input);
+  Systems systems = make_systems(*input, options.embree_device.c_str());
   const RayTracer& recorder = *systems.trees[systems.truth_trees];
   RecordedFrame recorded = record_frame(input->source, recorder, options.camera, options.size);
   const PrimaryCamera& camera = recorded.camera;
@@ -214,6 +215,7 @@ void add_options(BenchmarkOptions& command_line, Options& options) {
   command_line.flag(
       "--cpu-clock", options.cpu_clock,
       "CPU time of all threads divided by their number, not wall time: for machines that do other things");
+  command_line.add("--embree-device", options.embree_device, "configuration of Embree's device, such as max_isa=avx2");
   command_line.add("--max-mismatches", options.max_mismatches,
                    "fail if watertight systems differ from Embree robust in more than this share of a phase's rays");
   command_line
@@ -244,6 +246,7 @@ int run(int argc, char** argv) {
   }
   FiguresFile figures(options.json_file);
   Json json = describe_machine();
+  json["embree_device"] = options.embree_device;
   json["clock"] = options.cpu_clock ? "cpu" : "wall";
   if (options.growth)
     json["growth"] = measure_growth(options.inputs, options.camera, options.size, options.repeats, options.cpu_clock);

@@ -64,7 +64,7 @@ std::vector<std::vector<HitVerdicts>> judge_phases(const TraceInput& input, cons
 
 } // namespace
 
-Systems make_systems(const TraceInput& input) {
+Systems make_systems(const TraceInput& input, const char* embree_device) {
   struct Variant {
     const char* name;
     EmbreeConfig config;
@@ -79,7 +79,9 @@ Systems make_systems(const TraceInput& input) {
                                  Variant{"Embree high", {BvhQuality::kHigh, false, false, false}},
                                  Variant{"Embree compact", {BvhQuality::kMedium, false, true, false}}}) {
     const Stopwatch watch;
-    out.trees.push_back(std::make_unique<EmbreeTracer>(input.source, variant.config));
+    EmbreeConfig config = variant.config;
+    config.device = embree_device;
+    out.trees.push_back(std::make_unique<EmbreeTracer>(input.source, config));
     const double build_ms = 1e3 * watch.seconds();
     for (const Call& call :
          {Call{"1", EmbreeCall::kSingle}, Call{"16", EmbreeCall::kPacket16}, Call{"1M", EmbreeCall::kStream}})

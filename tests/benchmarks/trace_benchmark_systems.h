@@ -35,7 +35,9 @@ struct Systems {
   size_t truth_trees = 0;
 };
 
-Systems make_systems(const TraceInput& input);
+/// Returns all systems for an input, without rays.
+/// @param embree_device configuration of rtcNewDevice(), such as "max_isa=avx2", for Embree's trees
+Systems make_systems(const TraceInput& input, const char* embree_device);
 
 /// Judges with exact hits which systems are right, and prints a table. Needs the systems' rays and results.
 nlohmann::ordered_json compare_with_exact_hits(const TraceInput& input, const Systems& systems);

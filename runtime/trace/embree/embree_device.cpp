@@ -5,8 +5,8 @@
 
 namespace packtrace {
 
-EmbreeDevice::EmbreeDevice(const std::optional<MemoryBudget>& budget)
-    : budget_(budget), device_(rtcNewDevice(nullptr)) {
+EmbreeDevice::EmbreeDevice(const std::optional<MemoryBudget>& budget, const char* options)
+    : budget_(budget), device_(rtcNewDevice(options)) {
   if (!device_ && rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw MemoryError(kNoMemory);
   if (!device_) throw Error(ErrorKind::kUnsupported, "Embree cannot create a device on this machine");
   if (budget_) reserved_ = MemoryReservation(*budget_);

@@ -25,9 +25,10 @@ using RtcPtr = std::unique_ptr<T, ReleaseRtc>;
 class EmbreeDevice {
 public:
   /// Allocations beyond the budget fail, which check() reports.
+  /// @param options of rtcNewDevice(), or null
   /// Throws Error(kUnsupported) if the device cannot be made or was built without ray masks, filter functions,
   /// ray streams or triangles.
-  explicit EmbreeDevice(const std::optional<MemoryBudget>& budget = std::nullopt);
+  explicit EmbreeDevice(const std::optional<MemoryBudget>& budget = std::nullopt, const char* options = nullptr);
   EmbreeDevice(const EmbreeDevice&) = delete;
   EmbreeDevice& operator=(const EmbreeDevice&) = delete;
 

@@ -40,7 +40,7 @@ struct EmbreeTracer::Part {
 
 /// The Embree objects. The order matters: members are destroyed in reverse.
 struct EmbreeTracer::Device {
-  explicit Device(const EmbreeConfig& config) : embree(config.memory) {}
+  explicit Device(const EmbreeConfig& config) : embree(config.memory, config.device) {}
 
   EmbreeDevice embree;
   std::vector<RtcPtr<RTCSceneTy>> surface_scenes; ///< by surface; null unless the surface is instanced

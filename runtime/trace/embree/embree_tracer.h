@@ -29,6 +29,8 @@ struct EmbreeConfig {
   bool check_slivers = true;
   /// Reserves memory for vertices, indices and trees; unset: no limit.
   std::optional<MemoryBudget> memory = std::nullopt;
+  /// Configuration of rtcNewDevice(), such as "max_isa=avx2"; null: Embree's defaults.
+  const char* device = nullptr;
 };
 
 /// Traces a SceneSource with Embree 3: triangles are decoded to floats once, and Embree builds its trees over them.
