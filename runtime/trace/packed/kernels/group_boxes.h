@@ -75,18 +75,16 @@ struct ChildRays {
     typename Lanes::Masks masks;
     for (; rays != 0; rays &= rays - 1) {
       const auto ray = static_cast<uint32_t>(__builtin_ctzll(rays));
-      F begin = Lanes::set(group.limits[ray][0]), end = Lanes::set(group.tmax(ray));
+      // Negated ends, so that nothing that is read has to be negated.
+      F begin = Lanes::set(group.limits[ray][0]), minus_end = Lanes::set(group.limits[ray][1]);
       for (uint32_t axis = 0; axis < 3; ++axis) {
         const F inverse = Lanes::set(group.inverse[axis][ray]);
         begin = Lanes::max(begin, Lanes::fma(boxes.near[axis], inverse, Lanes::set(group.bias[axis][ray][0])));
-        end = Lanes::min(end, Lanes::fma(boxes.far[axis], inverse, Lanes::set(-group.bias[axis][ray][1])));
+        minus_end = Lanes::max(minus_end, Lanes::fnma(boxes.far[axis], inverse, Lanes::set(group.bias[axis][ray][1])));
       }
-      masks.add_less_equal(begin, end, uint64_t{1} << ray);
+      masks.add_less_equal(begin, Lanes::negate(minus_end), ray);
     }
-    masks.read(out);
-    uint32_t used = 0;
-    for (uint32_t child = 0; child < baked::kNodeWidth; ++child) used |= (out[child] != 0 ? 1u : 0u) << child;
-    return used;
+    return masks.read(out);
   }
 
   /// Computes the t at which a ray enters each box.

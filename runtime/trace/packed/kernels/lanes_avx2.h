@@ -8,24 +8,39 @@
 namespace packtrace::packed {
 namespace {
 
+/// The low and high halves of the 64 single-bit masks.
+struct HalvesOfBits {
+  uint32_t half[64][2];
+  constexpr HalvesOfBits() : half{} {
+    for (uint32_t i = 0; i < 64; ++i) half[i][i / 32] = uint32_t{1} << (i % 32);
+  }
+};
+alignas(64) constexpr HalvesOfBits kHalvesOfBits;
+
 struct Avx2Lanes {
   using F = __m256;
   static constexpr uint32_t kLanes = 8;
 
   /// One 64-bit mask per lane.
   struct Masks {
-    __m256i low = _mm256_setzero_si256(), high = _mm256_setzero_si256();
+    __m256i low = _mm256_setzero_si256(), high = _mm256_setzero_si256(); ///< bits 0 to 31 and 32 to 63 of each mask
 
-    /// Sets a bit in the masks of the lanes where a <= b.
-    void add_less_equal(F a, F b, uint64_t bit) {
+    /// Sets bit `bit` in the masks of the lanes where a <= b.
+    void add_less_equal(F a, F b, uint32_t bit) {
       const __m256i all = _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LE_OQ));
-      const __m256i bits = _mm256_set1_epi64x(static_cast<int64_t>(bit));
-      low = _mm256_or_si256(low, _mm256_and_si256(bits, _mm256_cvtepi32_epi64(_mm256_castsi256_si128(all))));
-      high = _mm256_or_si256(high, _mm256_and_si256(bits, _mm256_cvtepi32_epi64(_mm256_extracti128_si256(all, 1))));
+      const auto lanes = [&](uint32_t half) {
+        return _mm256_and_si256(all, _mm256_set1_epi32(static_cast<int32_t>(kHalvesOfBits.half[bit][half])));
+      };
+      low = _mm256_or_si256(low, lanes(0));
+      high = _mm256_or_si256(high, lanes(1));
     }
-    void read(uint64_t (&out)[8]) const {
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), low);
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + 4), high);
+    /// Returns the lanes whose masks are not 0, as a bit mask.
+    uint32_t read(uint64_t (&out)[8]) const {
+      const __m256i even = _mm256_unpacklo_epi32(low, high), odd = _mm256_unpackhi_epi32(low, high); // 0 1 4 5, 2 3 6 7
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm256_permute2x128_si256(even, odd, 0x20));
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + 4), _mm256_permute2x128_si256(even, odd, 0x31));
+      const __m256i none = _mm256_cmpeq_epi32(_mm256_or_si256(low, high), _mm256_setzero_si256());
+      return bits(_mm256_castsi256_ps(none)) ^ 0xffu;
     }
   };
 
@@ -35,22 +50,6 @@ struct Avx2Lanes {
     return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
   }
   static F set(float x) { return _mm256_set1_ps(x); }
-  /// Loads kCount (4 or 8) floats and repeats them to fill the register.
-  template <uint32_t kCount>
-  static F repeat(const float* p) {
-    if constexpr (kCount == 8) return load(p);
-    return _mm256_broadcast_ps(reinterpret_cast<const __m128*>(p));
-  }
-  /// Reads floats kFirst to kFirst + 3 of each record. out[n] holds float kFirst + n of each record, kCount times in a
-  /// row.
-  template <uint32_t kCount, uint32_t kFirst, typename Record>
-  static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
-    const auto four = [&](uint32_t i) { return reinterpret_cast<const __m128*>(records[i]) + kFirst / 4; };
-    F all = _mm256_broadcast_ps(four(0));
-    if constexpr (kCount == 4) all = _mm256_insertf128_ps(all, *four(1), 1);
-    out[0] = _mm256_permute_ps(all, 0x00), out[1] = _mm256_permute_ps(all, 0x55);
-    out[2] = _mm256_permute_ps(all, 0xaa), out[3] = _mm256_permute_ps(all, 0xff);
-  }
   static F add(F a, F b) { return _mm256_add_ps(a, b); }
   static F sub(F a, F b) { return _mm256_sub_ps(a, b); }
   static F mul(F a, F b) { return _mm256_mul_ps(a, b); }

@@ -16,12 +16,14 @@ struct ScalarLanes {
   struct Masks {
     uint64_t lane[8] = {};
 
-    /// Sets a bit in the masks of the lanes where a <= b.
-    void add_less_equal(F a, F b, uint64_t bit) {
-      for (uint32_t i = 0; i < 8; ++i) lane[i] |= a.lane[i] <= b.lane[i] ? bit : 0;
+    /// Sets bit `bit` in the masks of the lanes where a <= b.
+    void add_less_equal(F a, F b, uint32_t bit) {
+      for (uint32_t i = 0; i < 8; ++i) lane[i] |= uint64_t{a.lane[i] <= b.lane[i]} << bit;
     }
-    void read(uint64_t (&out)[8]) const {
+    /// Returns the lanes whose masks are not 0, as a bit mask.
+    uint32_t read(uint64_t (&out)[8]) const {
       for (uint32_t i = 0; i < 8; ++i) out[i] = lane[i];
+      return bits([&](uint32_t i) { return lane[i] != 0; });
     }
   };
 
@@ -49,18 +51,6 @@ struct ScalarLanes {
   }
   static F set(float x) {
     return each([&](uint32_t) { return x; });
-  }
-  /// Loads kCount (4 or 8) floats and repeats them to fill the register.
-  template <uint32_t kCount>
-  static F repeat(const float* p) {
-    return each([&](uint32_t i) { return p[i % kCount]; });
-  }
-  /// Reads floats kFirst to kFirst + 3 of each record. out[n] holds float kFirst + n of each record, kCount times in a
-  /// row.
-  template <uint32_t kCount, uint32_t kFirst, typename Record>
-  static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
-    for (uint32_t n = 0; n < 4; ++n)
-      out[n] = each([&](uint32_t i) { return reinterpret_cast<const float*>(records[i / kCount])[kFirst + n]; });
   }
   static F add(F a, F b) {
     return each([&](uint32_t i) { return a.lane[i] + b.lane[i]; });

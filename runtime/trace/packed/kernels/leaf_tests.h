@@ -95,7 +95,8 @@ inline uint64_t test_several_rays(const DecodedBatch& batch, const BatchNormals&
                                   uint64_t rays, Fine fine, uint64_t& exact) {
   using Triangles = BatchLanes<WideLanes, kTriangles, kUseResidual>;
   constexpr uint32_t kRays = Triangles::kRays;
-  constexpr uint32_t kFirstLanes = (kTriangles == 8 ? 0x0101u : 0x1111u) & ((1u << WideLanes::kLanes) - 1);
+  static_assert(WideLanes::kLanes == 16);
+  constexpr uint32_t kFirstLanes = kTriangles == 8 ? 0x0101u : 0x1111u;
   const uint32_t wanted = ((1u << batch.count) - 1) * kFirstLanes;
   uint64_t hit = 0;
   for (uint32_t k = 0; k < 3; ++k) {
@@ -160,8 +161,10 @@ template <typename Lanes, bool kUseResidual, typename Fine>
 inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                               uint64_t rays, Fine fine, uint64_t& exact) {
   using WideLanes = typename Lanes::WideLanes;
-  if constexpr (!kUseResidual) // Nearest hits are filtered by this function for more rays only.
-    if (count_ones(rays) <= kFewRays) {
+  constexpr bool kWide = WideLanes::kLanes > Lanes::kLanes; // whether a register holds several rays
+  static_assert(kWide || !kUseResidual, "only wide registers filter nearest hits");
+  if constexpr (!kUseResidual)
+    if (!kWide || count_ones(rays) <= kFewRays) {
       uint64_t hit = 0;
       for (; rays != 0; rays &= rays - 1) {
         const uint32_t ray = first_bit(rays);
@@ -169,8 +172,9 @@ inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& nor
       }
       return hit;
     }
-  return batch.count <= 4 ? test_several_rays<WideLanes, 4, kUseResidual>(batch, normals, group, rays, fine, exact)
-                          : test_several_rays<WideLanes, 8, kUseResidual>(batch, normals, group, rays, fine, exact);
+  if constexpr (kWide)
+    return batch.count <= 4 ? test_several_rays<WideLanes, 4, kUseResidual>(batch, normals, group, rays, fine, exact)
+                            : test_several_rays<WideLanes, 8, kUseResidual>(batch, normals, group, rays, fine, exact);
 }
 
 } // namespace

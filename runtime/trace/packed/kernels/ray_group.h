@@ -13,7 +13,7 @@ namespace {
 /// Maximum number of rays in a group: the bits of a 64-bit mask.
 constexpr uint32_t kGroup = 64;
 /// Minimum number of rays at a node for tests on the group as a whole (reach) and for testing rays side by side.
-constexpr uint32_t kMinSideBySideRays = 12;
+constexpr uint32_t kMinSideBySideRays = 32;
 
 /// Box planes are moved outwards by this times M, the largest coordinate of the ray's origin and the tree. It covers
 /// all roundings, here in units of u = 2^-24 for a direction whose largest component is in [1, 2):

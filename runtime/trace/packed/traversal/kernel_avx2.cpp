@@ -1,3 +1,4 @@
+#include "runtime/trace/packed/kernels/batch_decode_avx2.h"
 #include "runtime/trace/packed/kernels/lanes_avx2.h"
 #include "runtime/trace/packed/traversal/traversal.h"
 
@@ -10,7 +11,7 @@ struct Avx2Kernel : Avx2Lanes {
   using Children = ChildRays<Avx2Lanes>;
 
   static uint32_t decode(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
-    return decode_batch_scalar(cluster, first, count, out);
+    return decode_batch_avx2(cluster, first, count, out);
   }
 };
 

@@ -62,15 +62,15 @@ private:
         batch_normals_of_large(batch, normals);
       uint64_t exact = 0;
       if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
-        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, fine, exact);
+        alive_ &= ~rays_that_hit<Lanes, false>(batch, normals, group, rays, fine, exact);
       } else if (!kAny && !Fine::value && group.beam != nullptr) {
         test_each(batch, normals, place, group, test_beam(batch, normals, place, group, rays), fine);
       } else {
-        const uint64_t others = test_side_by_side(batch, normals, place, group, rays, fine);
-        const bool many =
-            Lanes::WideLanes::kLanes > kBatch && count_ones(others) >= kMinPrefilteredRays && group.beam == nullptr;
-        test_each(batch, normals, place, group,
-                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, fine, exact) : others, fine);
+        uint64_t others = test_side_by_side(batch, normals, place, group, rays, fine);
+        if constexpr (Lanes::WideLanes::kLanes > kBatch)
+          if (count_ones(others) >= kMinPrefilteredRays && group.beam == nullptr)
+            others = rays_that_hit<Lanes, !kAny>(batch, normals, group, others, fine, exact);
+        test_each(batch, normals, place, group, others, fine);
       }
       if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
