@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <optional>
 
 namespace packtrace {
 namespace {
@@ -163,7 +164,65 @@ private:
   Strips strips_;
 };
 
+/// Builds strips from triangles in their order.
+class OrderedStrips {
+public:
+  explicit OrderedStrips(uint32_t vertex_count) : number_(vertex_count, ~0u) {}
+
+  Strips run(std::span<const Triangle> triangles) {
+    std::array<uint32_t, 3> last{}; // corners of the last triangle, the newest at the end
+    uint32_t strip_count = 0;
+    for (uint32_t i = 0; i < triangles.size(); ++i) {
+      const Triangle& t = triangles[i];
+      const std::optional<uint32_t> right = i == 0 ? std::nullopt : third_corner(t, last[2], last[1]);
+      const std::optional<uint32_t> left = i == 0 ? std::nullopt : third_corner(t, last[0], last[2]);
+      strips_.triangle_order.push_back(i);
+      strips_.restart.push_back(!right && !left);
+      strips_.left.push_back(!right && left);
+      if (right || left) {
+        last = right ? std::array{last[2], last[1], *right} : std::array{last[0], last[2], *left};
+        add_corner(last[2]);
+        continue;
+      }
+      ++strip_count;
+      last = {t.x, t.y, t.z};
+      // The next triangle should follow by a right turn: across the edge that ends in the newest corner.
+      if (i + 1 < triangles.size())
+        for (uint32_t k = 0; k < 3 && !third_corner(triangles[i + 1], last[2], last[1]); ++k)
+          last = {last[1], last[2], last[0]};
+      for (const uint32_t vertex : last) add_corner(vertex);
+    }
+    strips_.layout = {static_cast<uint32_t>(triangles.size()), static_cast<uint32_t>(strips_.vertex_order.size()),
+                      strip_count};
+    return std::move(strips_);
+  }
+
+private:
+  /// Returns the third corner of a triangle that has the edge from `from` to `to`.
+  static std::optional<uint32_t> third_corner(const Triangle& t, uint32_t from, uint32_t to) {
+    for (int e = 0; e < 3; ++e)
+      if (t[e] == from && t[(e + 1) % 3] == to) return t[(e + 2) % 3];
+    return std::nullopt;
+  }
+
+  void add_corner(uint32_t vertex) {
+    if (number_[vertex] == ~0u) {
+      number_[vertex] = static_cast<uint32_t>(strips_.vertex_order.size());
+      strips_.vertex_order.push_back(vertex);
+    }
+    strips_.corners.push_back(number_[vertex]);
+  }
+
+  std::vector<uint32_t> number_; // old vertex -> new vertex, ~0 if not used yet
+  Strips strips_;
+};
+
 } // namespace
+
+Strips strips_in_order(std::span<const Triangle> triangles, uint32_t vertex_count) {
+  assert(!triangles.empty() && triangles.size() <= kMaxClusterTriangles);
+  return OrderedStrips(vertex_count).run(triangles);
+}
 
 Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends) {
   assert(!triangles.empty() && triangles.size() <= kMaxClusterTriangles);
