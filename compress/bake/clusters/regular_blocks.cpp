@@ -218,7 +218,7 @@ private:
     return best;
   }
 
-  /// Cuts the part into blocks, unless they hold less than half of it.
+  /// Cuts the part into blocks, unless they hold less than two fifths of it.
   void cut_blocks() {
     if (part_.size() < kMaxClusterTriangles) return;
     Place lo = places_[part_[0]], hi = lo;
@@ -247,7 +247,7 @@ private:
         for_each_full_block({x, y}, size, [&](int32_t, int32_t) { ++count; });
         if (count > most) most = count, best = {x, y};
       }
-    if (most * 4 * static_cast<size_t>(size.quads()) < part_.size())
+    if (5 * most * static_cast<size_t>(size.quads()) < part_.size())
       return; // what is left of irregular parts is hard to cut
     for_each_full_block(best, size, [&](int32_t x, int32_t y) { add_block(x, y, size); });
   }
