@@ -11,7 +11,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr uint32_t kMaxSubdivisions = 3; // subdivision levels here; the refiner adds its own
 // Maximum number of distances per triangle (source and simplified). Limits the time in soups, where every triangle is
 // near all others and more work gains little.
-constexpr size_t kWork = 100;
+constexpr size_t kWork = 400;
 
 } // namespace
 
