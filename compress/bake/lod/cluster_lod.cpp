@@ -56,7 +56,10 @@ class LodBuilder {
 public:
   LodBuilder(const QuantizedGeometry& geometry, Progress& progress, const LodLimits& limits)
       : g_(geometry), progress_(progress), max_levels_(limits.max_levels), locked_for_ever_(limits.locked) {
+    // Levels add fewer than there are at level 0.
+    lod_.positions.reserve(2 * geometry.positions.size());
     lod_.positions = geometry.positions;
+    lod_.vertices.reserve(2 * geometry.vertices.size());
     lod_.vertices = geometry.vertices;
     for (const TriangleKind& kind : geometry.kinds) seam_of_kind_.push_back(kind.slot);
   }
@@ -78,6 +81,7 @@ private:
   void take_base(const GeometryClusters& base) {
     lod_.triangles.reserve(2 * base.triangles.size());
     lod_.triangles = base.triangles;
+    triangle_errors_.reserve(2 * base.triangles.size());
     triangle_errors_.assign(base.triangles.size(), 0.0);
     history_ = TriangleHistory(static_cast<uint32_t>(base.triangles.size()));
     for (const ClusterRange& range : base.clusters) lod_.clusters.push_back({range, 0, kNoGroup, kNoGroup});

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "compress/bake/clusters/cluster_cutter.h"
@@ -77,7 +78,7 @@ Clusters split_level(const ClusterizeInput& input, std::span<const DVec3> positi
   const std::vector<TreeBox> boxes = boxes_of(input.points, positions);
   Clusters grown = clusterize(input), cut = cut_clusters(boxes, input.vertices, input.vertex_count);
   BitEstimate bits(input, boxes, normals);
-  return bits(cut) < bits(grown) ? cut : grown;
+  return bits(cut) < bits(grown) ? std::move(cut) : std::move(grown);
 }
 
 } // namespace packtrace

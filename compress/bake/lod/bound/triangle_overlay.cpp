@@ -80,6 +80,7 @@ bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std
                       std::vector<OverlayPiece>& pieces) {
   static const OverlayKernel kernel = pick_kernel();
   found_count_ = 0;
+  open_sides_known_ = false;
   const double length = glm::length(direction);
   if (!(length > 0.0) || candidates.empty()) return false;
   if (corners_.empty()) prepare();
@@ -107,7 +108,11 @@ bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std
     found_count_ = kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &cover);
     largest_piece_ = cover.largest;
   };
-  const auto no_open_sides = [&] { return has_no_open_sides(std::span(found_).first(found_count_)); };
+  const auto no_open_sides = [&] {
+    find_open_sides(std::span(found_).first(found_count_));
+    open_sides_known_ = true;
+    return open_sides_.empty();
+  };
   find();
   if (cover.count < 1.0 - kCoverageRounding) return false;
   bool together = no_open_sides();
@@ -121,8 +126,8 @@ bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std
   return true;
 }
 
-/// Whether no candidate side through the interior is a border of the pieces.
-bool Overlay::has_no_open_sides(std::span<const OverlayPiece> pieces) {
+/// Sets open_sides_ to the candidate sides through the interior that are borders of the pieces.
+void Overlay::find_open_sides(std::span<const OverlayPiece> pieces) {
   open_sides_.clear();
   for (const OverlayPiece& piece : pieces)
     for (uint32_t i = 0; i < 3; ++i) {
@@ -138,7 +143,6 @@ bool Overlay::has_no_open_sides(std::span<const OverlayPiece> pieces) {
       else
         open_sides_[found] = open_sides_.back(), open_sides_.pop_back();
     }
-  return open_sides_.empty();
 }
 
 OverlayPolygon Overlay::overlap(const OverlayPiece& piece) const {

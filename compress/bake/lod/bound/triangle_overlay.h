@@ -64,7 +64,8 @@ public:
     }
     OverlayPoint covered{};
     if (near_.empty() || !find_point_in(near_[largest], covered)) return false;
-    has_no_open_sides(near_); // sets open_sides_
+    if (!open_sides_known_ || near_.size() < found_count_) find_open_sides(near_);
+    open_sides_known_ = near_.size() == found_count_;
     for (const OpenSide& side : open_sides_) {
       const double distance = distance_beyond(side, covered);
       if (distance < 0.0) continue;
@@ -94,7 +95,7 @@ private:
   };
 
   void prepare(); ///< on first use, as most overlays are never needed
-  bool has_no_open_sides(std::span<const OverlayPiece> pieces);
+  void find_open_sides(std::span<const OverlayPiece> pieces);
   OverlayPolygon overlap(const OverlayPiece& piece) const;
   bool find_point_in(const OverlayPiece& piece, OverlayPoint& out) const;
   double distance_beyond(const OpenSide& side, const OverlayPoint& covered) const;
@@ -107,6 +108,7 @@ private:
   uint32_t found_count_ = 0, largest_piece_ = 0;
   std::vector<OverlayPiece> near_; ///< those of found_ that are near enough, then what lies beyond their open sides
   std::vector<OpenSide> open_sides_;
+  bool open_sides_known_ = false; ///< whether open_sides_ are those of all pieces in found_
   OverlayTask task_{};
   std::array<DVec3, 3> triangle_{};
   DVec3 direction_{};
