@@ -201,6 +201,18 @@ def lod_tables(results):
     print_table(["stated error over the measured one", "median group", "worst group"],
                 [[mesh["name"], f"{mesh['groups_stated_to_measured']:.2f}", f"{mesh['worst_group_stated_to_measured']:.2f}"]
                  for mesh in results("lod_levels")["inputs"]])
+    print("Simplified meshes: rms, largest distance over those of the newest meshoptimizer; \"exact\": none of ours.\n")
+    rows = []
+    for mesh in results("lod_classes")["inputs"]:
+        of = {(r["simplifier"], r["kept"]): r for r in mesh["simplifiers"]}
+        cells = [f"{mesh['name']}"]
+        for kept in (0.5, 0.1, 0.01):
+            ours, theirs = of["packtrace", kept], of.get(("meshoptimizer, newest", kept))
+            cells.append("not taken by theirs" if theirs is None else ", ".join(
+                "exact" if ours[d] == 0 else f"{ours[d] / theirs[d]:.2f}" if theirs[d] > 0 else "theirs exact"
+                for d in ("rms", "max")))
+        rows.append(cells)
+    print_table(["mesh", "50 %", "10 %", "1 %"], rows)
 
 
 def main():
