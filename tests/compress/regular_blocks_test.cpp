@@ -126,17 +126,17 @@ TEST(RegularBlocks, ElongatedQuadsAreGatheredAcross) {
 }
 
 TEST(RegularBlocks, KindsAndSplitVerticesEndBlocks) {
-  QuantizedGeometry geometry = grid(32, 16, flat);
+  QuantizedGeometry geometry = grid(32, 32, flat);
   for (size_t t = 0; t < geometry.triangles.size(); ++t) // columns from 12 on
     if (t / 2 % 32 >= 12) geometry.kind_of[t] = 1;
   geometry.kinds.resize(2);
   for (const RegularBlock& block : find_regular_blocks(geometry))
     for (const uint32_t t : triangles_of(block)) EXPECT_EQ(geometry.kind_of[t], geometry.kind_of[block.triangles[0]]);
 
-  geometry = grid(32, 16, flat);
+  geometry = grid(32, 32, flat);
   for (size_t t = 0; t < geometry.triangles.size(); ++t) // own vertices for columns from 12 on
     for (int c = 0; c < 3; ++c)
-      if (uint32_t& v = geometry.triangles[t][c]; t / 2 % 32 >= 12 && v % 33 == 12) v += 17 * 33;
+      if (uint32_t& v = geometry.triangles[t][c]; t / 2 % 32 >= 12 && v % 33 == 12) v += 33 * 33;
   geometry.vertices.resize(2 * geometry.vertices.size());
   for (size_t v = 0; v < geometry.vertices.size(); ++v)
     geometry.vertices[v].position = static_cast<uint32_t>(v % geometry.positions.size());

@@ -19,6 +19,7 @@ constexpr int32_t kMaxBlockColumns = 32;
 constexpr double kMaxElongation = 2.5; ///< of a block, by the mean lengths of its sides
 /// Cost of a block beside its vertices, in vertices; of a triangle outside all blocks.
 constexpr double kBlockCost = 8.0, kRestCost = 1.0;
+constexpr size_t kFewBlocks = 4; ///< so many are needed where they do not fill a part
 /// Sizes that are powers of two repeat more of the positions of symmetric shapes, so others must cost less by this.
 constexpr double kOddCost = 1.05;
 constexpr int32_t kMaxCoordinate = 1 << 24;
@@ -218,7 +219,7 @@ private:
     return best;
   }
 
-  /// Cuts the part into blocks, unless they hold less than two fifths of it.
+  /// Cuts the part into blocks, unless they hold less than two fifths of it or are few.
   void cut_blocks() {
     if (part_.size() < kMaxClusterTriangles) return;
     Place lo = places_[part_[0]], hi = lo;
@@ -247,8 +248,9 @@ private:
         for_each_full_block({x, y}, size, [&](int32_t, int32_t) { ++count; });
         if (count > most) most = count, best = {x, y};
       }
-    if (5 * most * static_cast<size_t>(size.quads()) < part_.size())
-      return; // what is left of irregular parts is hard to cut
+    const size_t quads = most * static_cast<size_t>(size.quads());
+    // What is left of irregular parts is hard to cut, and few blocks have little to repeat.
+    if (5 * quads < part_.size() || (most < kFewBlocks && 2 * quads < part_.size())) return;
     for_each_full_block(best, size, [&](int32_t x, int32_t y) { add_block(x, y, size); });
   }
 
