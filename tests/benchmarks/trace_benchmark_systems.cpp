@@ -73,15 +73,16 @@ Systems make_systems(const TraceInput& input, const char* embree_device) {
     const char* name;
     EmbreeCall call;
   };
+  const auto config = [&](BvhQuality quality, bool robust, bool compact) {
+    return EmbreeConfig{quality, robust, compact, false, std::nullopt, embree_device};
+  };
   Systems out;
-  for (const Variant& variant : {Variant{"Embree default", {BvhQuality::kMedium, false, false, false}},
-                                 Variant{"Embree robust", {BvhQuality::kMedium, true, false, false}},
-                                 Variant{"Embree high", {BvhQuality::kHigh, false, false, false}},
-                                 Variant{"Embree compact", {BvhQuality::kMedium, false, true, false}}}) {
+  for (const Variant& variant : {Variant{"Embree default", config(BvhQuality::kMedium, false, false)},
+                                 Variant{"Embree robust", config(BvhQuality::kMedium, true, false)},
+                                 Variant{"Embree high", config(BvhQuality::kHigh, false, false)},
+                                 Variant{"Embree compact", config(BvhQuality::kMedium, false, true)}}) {
     const Stopwatch watch;
-    EmbreeConfig config = variant.config;
-    config.device = embree_device;
-    out.trees.push_back(std::make_unique<EmbreeTracer>(input.source, config));
+    out.trees.push_back(std::make_unique<EmbreeTracer>(input.source, variant.config));
     const double build_ms = 1e3 * watch.seconds();
     for (const Call& call :
          {Call{"1", EmbreeCall::kSingle}, Call{"16", EmbreeCall::kPacket16}, Call{"1M", EmbreeCall::kStream}})
