@@ -44,7 +44,7 @@ inline __m128i batch_vertices(const TraceCluster& cluster, const BatchStrips& ba
   const __m128i name = _mm_add_epi8(_mm_sub_epi8(iota, _mm_set1_epi8(static_cast<char>(batch.lead_count))), less);
 
   __m128i vertices = _mm_blendv_epi8(_mm_shuffle_epi8(name_bytes, name), fresh, is_fresh);
-  if (lead != 0) vertices = _mm_insert_epi16(vertices, static_cast<int>(batch.lead[0] | batch.lead[1] << 8), 0);
+  if (lead != 0) vertices = _mm_insert_epi16(vertices, static_cast<int16_t>(batch.lead[0] | batch.lead[1] << 8), 0);
   return _mm_and_si128(vertices, _mm_cmpgt_epi8(_mm_set1_epi8(static_cast<char>(batch.corner_count)), iota));
 }
 
