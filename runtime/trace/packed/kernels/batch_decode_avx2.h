@@ -2,7 +2,7 @@
 
 #include <immintrin.h>
 
-#include "runtime/trace/packed/kernels/batch_strips.h"
+#include "runtime/trace/packed/kernels/batch_corners.h"
 
 /// Decodes a batch in AVX2 registers.
 namespace packtrace::packed {
@@ -10,9 +10,8 @@ namespace {
 
 /// Returns the vertex numbers of a batch's corners, a byte each; those of unused entries are 0.
 inline __m128i batch_vertices(const TraceCluster& cluster, const BatchStrips& batch) {
-  const uint32_t all = (1u << batch.corner_count) - 1, lead = (1u << batch.lead_count) - 1;
-  const uint32_t named = all & ~lead & ~batch.fresh, width = index_bits(cluster);
-  if (count_ones(uint64_t{named}) > 7) { // more explicit vertex numbers than one 64-bit load holds
+  const uint32_t width = index_bits(cluster);
+  if (count_ones(uint64_t{explicit_entries(batch)}) > kLoadedNumbers) {
     alignas(64) uint32_t vertex[kBatchCorners];
     batch_vertices(cluster, batch, vertex);
     const __m256i first = _mm256_load_si256(reinterpret_cast<const __m256i*>(vertex)),
@@ -33,7 +32,7 @@ inline __m128i batch_vertices(const TraceCluster& cluster, const BatchStrips& ba
   const __m128i fresh = _mm_sub_epi8(_mm_set1_epi8(static_cast<char>(batch.first_fresh - 1)), less);
 
   // Explicit numbers 0 to 3 are in the low, 4 to 7 in the high half of the register.
-  const uint64_t fields = load64(cluster.bits + (batch.explicit_bit >> 3)) >> (batch.explicit_bit & 7u);
+  const uint64_t fields = load_explicit_numbers(cluster, batch);
   const __m256i words = _mm256_inserti128_si256(_mm256_set1_epi32(static_cast<int>(static_cast<uint32_t>(fields))),
                                                 _mm_set1_epi32(static_cast<int>(fields >> (4 * width))), 1);
   const __m256i shifts =
@@ -44,7 +43,8 @@ inline __m128i batch_vertices(const TraceCluster& cluster, const BatchStrips& ba
   const __m128i name = _mm_add_epi8(_mm_sub_epi8(iota, _mm_set1_epi8(static_cast<char>(batch.lead_count))), less);
 
   __m128i vertices = _mm_blendv_epi8(_mm_shuffle_epi8(name_bytes, name), fresh, is_fresh);
-  if (lead != 0) vertices = _mm_insert_epi16(vertices, static_cast<int16_t>(batch.lead[0] | batch.lead[1] << 8), 0);
+  if (batch.lead_count != 0)
+    vertices = _mm_insert_epi16(vertices, static_cast<int16_t>(batch.lead[0] | batch.lead[1] << 8), 0);
   return _mm_and_si128(vertices, _mm_cmpgt_epi8(_mm_set1_epi8(static_cast<char>(batch.corner_count)), iota));
 }
 
@@ -81,29 +81,18 @@ inline void vertex_positions(const TraceCluster& cluster, __m256i vertices, __m2
   axis(2, z_bits, x_bits + y_bits);
 }
 
-/// Returns the corners of the batch's triangles as entries of its corner list; batch_triangle() explains how they are
-/// found.
-inline void batch_corners(const BatchStrips& batch, __m256i (&corner)[3]) {
-  const __m256i up_to = _mm256_setr_epi32(1, 3, 7, 15, 31, 63, 127, 255), one = _mm256_set1_epi32(1);
-  const __m256i restarts = _mm256_set1_epi32(static_cast<int>(batch.restarts)),
-                lefts = _mm256_set1_epi32(static_cast<int>(batch.lefts));
-  const auto highest = [](__m256i word) { // of a positive number below 2^24: the exponent as a float
-    return _mm256_sub_epi32(_mm256_srli_epi32(_mm256_castps_si256(_mm256_cvtepi32_ps(word)), 23),
-                            _mm256_set1_epi32(127));
-  };
-  const __m256i a = highest(_mm256_andnot_si256(lefts, up_to));
-  const __m256i b = highest(_mm256_and_si256(_mm256_or_si256(lefts, restarts), up_to));
-  // Twice the number of set bits of four bits, in every byte.
-  const __m256i twice_ones = _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 2, 2, 4, 2, 4, 4, 6, 2, 4, 4, 6, 4, 6, 6, 8));
-  const __m256i restarts_so_far = _mm256_and_si256(restarts, up_to);
-  const __m256i twice =
-      _mm256_add_epi32(_mm256_shuffle_epi8(twice_ones, _mm256_and_si256(restarts_so_far, _mm256_set1_epi32(15))),
-                       _mm256_shuffle_epi8(twice_ones, _mm256_srli_epi32(restarts_so_far, 4)));
-  const __m256i newest = _mm256_add_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), twice);
-  corner[0] = _mm256_sub_epi32(_mm256_sub_epi32(_mm256_permutevar8x32_epi32(newest, a), one),
-                               _mm256_and_si256(_mm256_srlv_epi32(restarts, a), one));
-  corner[1] = _mm256_sub_epi32(_mm256_permutevar8x32_epi32(newest, b), one);
-  corner[2] = newest;
+/// Returns the highest set bits of positive numbers below 2^24: their exponents as floats.
+inline __m256i highest_bits(__m256i words) {
+  return _mm256_sub_epi32(_mm256_srli_epi32(_mm256_castps_si256(_mm256_cvtepi32_ps(words)), 23),
+                          _mm256_set1_epi32(127));
+}
+
+/// Returns how many bits are set in each of eight numbers below 256.
+inline __m256i count_bits(__m256i words) {
+  const __m256i of_four_bits =
+      _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4));
+  return _mm256_add_epi32(_mm256_shuffle_epi8(of_four_bits, _mm256_and_si256(words, _mm256_set1_epi32(15))),
+                          _mm256_shuffle_epi8(of_four_bits, _mm256_srli_epi32(words, 4)));
 }
 
 /// Decodes triangles from `first` on, as many of `count` as fit into a batch; returns their number.
@@ -112,7 +101,7 @@ inline uint32_t decode_batch_avx2(const TraceCluster& cluster, uint32_t first, u
   read_strips(cluster, first, count, batch);
   const __m128i vertices = batch_vertices(cluster, batch);
   __m256i corner[3];
-  batch_corners(batch, corner);
+  batch_corners(batch, highest_bits, count_bits, corner);
   __m256 low[3], high[3];
   vertex_positions(cluster, _mm256_cvtepu8_epi32(vertices), low);
   if (batch.corner_count <= 8) {

@@ -2,7 +2,7 @@
 
 #include <immintrin.h>
 
-#include "runtime/trace/packed/kernels/batch_strips.h"
+#include "runtime/trace/packed/kernels/batch_corners.h"
 
 /// Decodes a batch in AVX-512 registers.
 namespace packtrace::packed {
@@ -10,9 +10,8 @@ namespace {
 
 /// Returns the vertex numbers of a batch's corners; unused lanes are 0.
 inline __m512i batch_vertices(const TraceCluster& cluster, const BatchStrips& batch) {
-  const uint32_t all = (1u << batch.corner_count) - 1, lead = (1u << batch.lead_count) - 1;
-  const uint32_t named = all & ~lead & ~batch.fresh, width = index_bits(cluster);
-  if (count_ones(uint64_t{named}) > 7) { // more explicit vertex numbers than one 64-bit load holds
+  const uint32_t named = explicit_entries(batch), width = index_bits(cluster);
+  if (count_ones(uint64_t{named}) > kLoadedNumbers) {
     alignas(64) uint32_t vertex[kBatchCorners];
     batch_vertices(cluster, batch, vertex);
     return _mm512_load_si512(vertex);
@@ -20,12 +19,12 @@ inline __m512i batch_vertices(const TraceCluster& cluster, const BatchStrips& ba
   const __m512i iota = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   const __m512i next = _mm512_add_epi32(iota, _mm512_set1_epi32(static_cast<int>(batch.first_fresh)));
   __m512i vertices = _mm512_maskz_expand_epi32(static_cast<__mmask16>(batch.fresh), next);
-  const uint64_t fields = load64(cluster.bits + (batch.explicit_bit >> 3)) >> (batch.explicit_bit & 7u);
+  const uint64_t fields = load_explicit_numbers(cluster, batch);
   const __m128i shifts = _mm_cvtsi64_si128(static_cast<int64_t>(0x0706050403020100u * uint64_t{width}));
   const __m128i bytes = _mm_multishift_epi64_epi8(shifts, _mm_cvtsi64_si128(static_cast<int64_t>(fields)));
   const __m512i names = _mm512_and_si512(_mm512_cvtepu8_epi32(bytes), _mm512_set1_epi32((1 << width) - 1));
   vertices = _mm512_mask_expand_epi32(vertices, static_cast<__mmask16>(named), names);
-  if (lead != 0)
+  if (batch.lead_count != 0)
     vertices = _mm512_mask_mov_epi32(
         vertices, 3,
         _mm512_castsi128_si512(_mm_cvtsi64_si128(static_cast<int64_t>(batch.lead[0] | uint64_t{batch.lead[1]} << 32))));
@@ -62,26 +61,17 @@ inline void batch_positions(const TraceCluster& cluster, __m512i vertices, uint3
   axis(2, z_bits, x_bits + y_bits);
 }
 
-/// Decodes triangles from `first` on, as many of `count` as fit into a batch; returns their number. batch_triangle()
-/// explains how corners are found.
+/// Decodes triangles from `first` on, as many of `count` as fit into a batch; returns their number.
 inline uint32_t decode_batch_avx512(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
   BatchStrips batch;
   read_strips(cluster, first, count, batch);
   __m512 position[3];
   batch_positions(cluster, batch_vertices(cluster, batch), batch.corner_count, position);
 
-  const __m256i up_to = _mm256_setr_epi32(1, 3, 7, 15, 31, 63, 127, 255);
-  const __m256i restarts = _mm256_set1_epi32(static_cast<int>(batch.restarts)),
-                lefts = _mm256_set1_epi32(static_cast<int>(batch.lefts)), one = _mm256_set1_epi32(1);
   const auto highest = [](__m256i word) { return _mm256_sub_epi32(_mm256_set1_epi32(31), _mm256_lzcnt_epi32(word)); };
-  const __m256i a = highest(_mm256_andnot_si256(lefts, up_to));
-  const __m256i b = highest(_mm256_and_si256(_mm256_or_si256(lefts, restarts), up_to));
-  const __m256i ones = _mm256_popcnt_epi32(_mm256_and_si256(restarts, up_to));
-  const __m256i newest = _mm256_add_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), _mm256_add_epi32(ones, ones));
-  const __m256i at_a = _mm256_sub_epi32(_mm256_permutevar8x32_epi32(newest, a), one),
-                at_b = _mm256_permutevar8x32_epi32(newest, b);
-  const __m256i corner[3] = {_mm256_sub_epi32(at_a, _mm256_and_si256(_mm256_srlv_epi32(restarts, a), one)),
-                             _mm256_sub_epi32(at_b, one), newest};
+  const auto ones = [](__m256i word) { return _mm256_popcnt_epi32(word); };
+  __m256i corner[3];
+  batch_corners(batch, highest, ones, corner);
   for (uint32_t axis = 0; axis < 3; ++axis)
     for (uint32_t i = 0; i < 3; ++i)
       _mm256_store_ps(out.vertex[axis][i],

@@ -120,6 +120,19 @@ inline BatchTriangle batch_triangle(const BatchStrips& batch, uint32_t i) {
   return {{newest(a) - 1 - ((batch.restarts >> a) & 1u), newest(b) - 1, newest(i)}};
 }
 
+/// Returns the entries of the corner list that have explicit vertex numbers, as a bit mask.
+inline uint32_t explicit_entries(const BatchStrips& batch) {
+  return ((1u << batch.corner_count) - 1) & ~((1u << batch.lead_count) - 1) & ~batch.fresh;
+}
+
+/// As many explicit vertex numbers as one 64-bit load holds at any bit.
+constexpr uint32_t kLoadedNumbers = 7;
+
+/// Returns a word with the first kLoadedNumbers explicit vertex numbers, from bit 0 on.
+inline uint64_t load_explicit_numbers(const TraceCluster& cluster, const BatchStrips& batch) {
+  return load64(cluster.bits + (batch.explicit_bit >> 3)) >> (batch.explicit_bit & 7u);
+}
+
 /// Computes the vertex number of each corner of the batch; unused entries are 0.
 inline void batch_vertices(const TraceCluster& cluster, const BatchStrips& batch, uint32_t vertex[kBatchCorners]) {
   uint32_t fresh = batch.first_fresh, explicit_bit = batch.explicit_bit;
