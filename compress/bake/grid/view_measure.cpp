@@ -22,8 +22,9 @@ bool outside(const std::array<DVec3, kCount>& points, ImageSize size) {
          all([&](DVec3 p) { return p.x > size.width * p.z; }) || all([&](DVec3 p) { return p.y > size.height * p.z; });
 }
 
-bool is_in_front(const PrimaryCamera& camera, DVec3 world) {
-  return camera.projection() != Projection::kPerspective || camera.view_z(world) > 0.0;
+/// Whether a point in homogeneous pixel coordinates is in front of the camera.
+bool is_in_front(const PrimaryCamera& camera, DVec3 point) {
+  return camera.projection() != Projection::kPerspective || point.z * camera.depth_scale() > 0.0;
 }
 
 class TriangleProjector {
@@ -40,11 +41,6 @@ public:
   }
 
 private:
-  /// is_in_front() of a point in homogeneous pixel coordinates.
-  bool in_view_depth(DVec3 seen) const {
-    return camera_.projection() != Projection::kPerspective || seen.z * camera_.depth_scale() > 0.0;
-  }
-
   /// World-space size of a pixel at a point in front of the camera.
   double pixel_at(DVec3 world) const {
     return camera_.projection() == Projection::kOrthographic ? spread_ : spread_ * camera_.view_z(world);
@@ -65,7 +61,7 @@ private:
     const std::array<DVec3, 3> seen{camera_.homogeneous_pixel(t[0]), camera_.homogeneous_pixel(t[1]),
                                     camera_.homogeneous_pixel(t[2])};
     if (outside(seen, camera_.size())) return 0.0;
-    if (!(in_view_depth(seen[0]) && in_view_depth(seen[1]) && in_view_depth(seen[2])))
+    if (!std::ranges::all_of(seen, [&](DVec3 point) { return is_in_front(camera_, point); }))
       return last ? 0.0 : halve(t, cuts);
     const glm::dvec2 a = glm::dvec2(seen[0]) / seen[0].z, b = glm::dvec2(seen[1]) / seen[1].z,
                      c = glm::dvec2(seen[2]) / seen[2].z;
@@ -154,7 +150,7 @@ double box_pixels(const PrimaryCamera& camera, const Bounds& world) {
     const DVec3 corner(i & 1 ? world.hi.x : world.lo.x, i & 2 ? world.hi.y : world.lo.y,
                        i & 4 ? world.hi.z : world.lo.z);
     corners[static_cast<size_t>(i)] = camera.homogeneous_pixel(corner);
-    in_front &= is_in_front(camera, corner);
+    in_front &= is_in_front(camera, corners[static_cast<size_t>(i)]);
   }
   if (outside(corners, camera.size())) return 0.0;
   if (!in_front) return all;
