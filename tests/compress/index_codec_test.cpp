@@ -31,11 +31,6 @@ EncodedIndices encode(std::span<const Triangle> triangles, uint32_t vertex_count
   return encode(find_strips(triangles, vertex_count));
 }
 
-/// The smallest rotation of a triangle.
-std::array<uint32_t, 3> rotated_to_smallest(Triangle t) {
-  return std::min({std::array{t.x, t.y, t.z}, std::array{t.y, t.z, t.x}, std::array{t.z, t.x, t.y}});
-}
-
 /// Decodes in both ways and compares with the source, up to rotation of each triangle.
 void expect_round_trip(std::span<const Triangle> triangles, Strips strips) {
   const EncodedIndices e = encode(std::move(strips));
@@ -50,7 +45,7 @@ void expect_round_trip(std::span<const Triangle> triangles, Strips strips) {
     seen[source] = true;
     const auto& order = e.strips.vertex_order;
     const Triangle t(order[decoded[i].x], order[decoded[i].y], order[decoded[i].z]);
-    EXPECT_EQ(rotated_to_smallest(t), rotated_to_smallest(triangles[source]));
+    EXPECT_EQ(test::rotated_to_smallest(t), test::rotated_to_smallest(triangles[source]));
   }
 }
 

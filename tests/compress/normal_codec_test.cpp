@@ -58,8 +58,8 @@ TEST_P(NormalCodec, CodesSplitAndJoin) {
   }
 }
 
-TEST_P(NormalCodec,
-       TheNarrowestPackingIsThatOfAllNormals) { // although only the corners of each chart's range are tried
+// Although only the corners of each chart's range are tried.
+TEST_P(NormalCodec, TheNarrowestPackingIsThatOfAllNormals) {
   test::Random random(21);
   for (int round = 0; round < 3000; ++round) {
     // Normals around one direction, in any part of the sphere that up to three charts share.

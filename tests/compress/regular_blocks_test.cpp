@@ -27,7 +27,7 @@ QuantizedGeometry geometry_of(std::vector<LatticePoint> positions, std::vector<T
   return geometry;
 }
 
-/// A grid of quads with equal diagonals.
+/// A grid of quads that are all cut along the same diagonal.
 QuantizedGeometry grid(uint32_t columns, uint32_t rows, const std::function<LatticePoint(uint32_t, uint32_t)>& place,
                        bool closed = false) {
   const uint32_t width = closed ? columns : columns + 1, height = closed ? rows : rows + 1;
@@ -173,11 +173,9 @@ TEST(RegularBlocks, RepeatedAndTurnedTrianglesDoNoHarm) {
     }
     const GeometryClusters clusters = split_geometry(geometry);
     std::multiset<std::array<uint32_t, 3>> left;
-    for (const Triangle& t : geometry.triangles)
-      left.insert(std::min({std::array{t.x, t.y, t.z}, std::array{t.y, t.z, t.x}, std::array{t.z, t.x, t.y}}));
+    for (const Triangle& t : geometry.triangles) left.insert(test::rotated_to_smallest(t));
     for (const Triangle& t : clusters.triangles) {
-      const auto found =
-          left.find(std::min({std::array{t.x, t.y, t.z}, std::array{t.y, t.z, t.x}, std::array{t.z, t.x, t.y}}));
+      const auto found = left.find(test::rotated_to_smallest(t));
       ASSERT_NE(found, left.end());
       left.erase(found);
     }
