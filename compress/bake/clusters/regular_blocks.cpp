@@ -12,15 +12,17 @@ namespace {
 
 constexpr uint32_t kNothing = ~0u;
 constexpr uint32_t kRegularValence = 6;
-constexpr uint32_t kMaxBorderValence = 3; ///< of a vertex on a straight border or at a corner
+/// Maximum number of triangles that meet at a vertex on a straight border or at a corner of a grid.
+constexpr uint32_t kMaxBorderValence = 3;
 constexpr int32_t kBlockQuads = kMaxClusterTriangles / 2;
 constexpr uint32_t kProbe = 512; ///< triangles that show which edges are diagonals
 constexpr int32_t kMaxBlockColumns = 32;
 constexpr double kMaxElongation = 2.5; ///< of a block, by the mean lengths of its sides
-/// Cost of a block beside its vertices, in vertices; of a triangle outside all blocks.
-constexpr double kBlockCost = 8.0, kRestCost = 1.0;
-constexpr size_t kFewBlocks = 4; ///< so many are needed where they do not fill a part
-/// Sizes that are powers of two repeat more of the positions of symmetric shapes, so others must cost less by this.
+constexpr double kBlockCost = 8.0;     ///< of a block without its vertices, in bytes relative to those of a vertex
+constexpr double kRestCost = 1.0;      ///< of a triangle outside all blocks, likewise
+constexpr size_t kFewBlocks = 4;       ///< minimum number of blocks in a part that they do not fill
+/// Factor of the cost of blocks whose number of columns is no power of two. Powers of two divide symmetric shapes
+/// evenly, so their blocks repeat positions as well.
 constexpr double kOddCost = 1.05;
 constexpr int32_t kMaxCoordinate = 1 << 24;
 

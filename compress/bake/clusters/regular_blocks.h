@@ -10,7 +10,7 @@
 namespace packtrace {
 
 /// A cluster-sized rectangle of a regular grid: quads in rows, each cut along the same diagonal. All blocks of one size
-/// have the same topology, so their strips are equal, and a file that repeats them hardly grows.
+/// have equal strips, which a compressed page stores once.
 struct RegularBlock {
   uint32_t triangle_count = 0;
   std::array<uint32_t, kMaxClusterTriangles> triangles;   ///< their numbers, in the order of strips_in_order()

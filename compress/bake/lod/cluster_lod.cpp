@@ -56,7 +56,7 @@ class LodBuilder {
 public:
   LodBuilder(const QuantizedGeometry& geometry, Progress& progress, const LodLimits& limits)
       : g_(geometry), progress_(progress), max_levels_(limits.max_levels), locked_for_ever_(limits.locked) {
-    // Levels add fewer than there are at level 0.
+    // All coarser levels together have fewer than level 0.
     lod_.positions.reserve(2 * geometry.positions.size());
     lod_.positions = geometry.positions;
     lod_.vertices.reserve(2 * geometry.vertices.size());

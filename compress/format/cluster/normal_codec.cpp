@@ -131,7 +131,7 @@ void search_axis(Nearest& nearest, int32_t last, DVec3 n) {
   Float4 w;
   for (int i = 0; i < 4; ++i) w[i] = std::sqrt(std::max(square[i], 0.0f));
   if (n[axis] < 0.0) w = -w;
-  std::array<Double4, 3> squares; // of the chord, as in Nearest
+  std::array<Double4, 3> squares; // along each axis; their sums are squared chords, as in Nearest
   const auto put_square = [&](int along, Float4 component) {
     const Double4 d = __builtin_convertvector(component, Double4) - n[along];
     squares[static_cast<size_t>(along)] = d * d;

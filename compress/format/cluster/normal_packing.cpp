@@ -19,8 +19,8 @@ struct Range {
   uint8_t bits() const { return static_cast<uint8_t>(std::bit_width(static_cast<uint32_t>(hi - 2 * anchor()))); }
 };
 
-/// Opposite corners of the range of the normals of each chart. unfold_normal() keeps or swaps x and y and maps each
-/// monotonically, so that the corners have the range of all.
+/// Returns two normals per chart that is used: one with the least x and y of its normals, one with the largest.
+/// unfold_normal() maps x and y monotonically and may exchange them, so the range of the two is that of all.
 std::vector<NormalFields> chart_corners(std::span<const NormalFields> fields) {
   constexpr uint32_t kMaxCharts = 6;
   std::array<Range, kMaxCharts> x, y;

@@ -9,7 +9,7 @@ namespace packtrace {
 /// arrays of megabytes spend a tenth of their time on small pages: on faults, and on translating addresses.
 class LargeHeaps : private tbb::task_scheduler_observer {
 public:
-  /// The calling thread starts the work.
+  /// To be called by the thread that starts the work.
   LargeHeaps();
   ~LargeHeaps() override { observe(false); }
   LargeHeaps(const LargeHeaps&) = delete;
@@ -18,7 +18,7 @@ public:
 private:
   void on_scheduler_entry(bool is_worker) override;
 
-  tbb::enumerable_thread_specific<bool> prepared_{false}; // workers come and go
+  tbb::enumerable_thread_specific<bool> prepared_{false}; // per worker, as workers enter more than once
 };
 
 } // namespace packtrace
