@@ -103,7 +103,7 @@ TEST_P(PageCodecs, EveryNormalEncodingComesBack) {
 }
 
 TEST_P(PageCodecs, FilesOfManyPagesAreSmallAndTheSameForAnyThreadCount) {
-  const Scene scene = mixed_scene(180);
+  const Scene scene = mixed_scene(150);
   const BakedScene baked = test::bake(scene, config_of(GetParam()));
   EXPECT_GT(pages_of(baked.bytes).size(), 5u);
   EXPECT_EQ(baked.report.file.disk.codec, GetParam());

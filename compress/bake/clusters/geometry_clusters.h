@@ -11,7 +11,6 @@ namespace packtrace {
 struct ClusterRange {
   uint32_t first_triangle = 0, triangle_count = 0; ///< range in GeometryClusters::triangles
   uint32_t kind = 0;                               ///< index into QuantizedGeometry::kinds
-  uint32_t regular = 0;                            ///< 1: the triangles of a RegularBlock, in its order
 };
 
 /// The triangles of a geometry, cluster by cluster.
