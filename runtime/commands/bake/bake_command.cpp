@@ -92,7 +92,7 @@ void add_sequences(const BakeOptions& options, const ImportResult& imported, Bak
 }
 
 int run(const BakeOptions& given, const GlobalOptions& globals) {
-  const LargeHeaps large_heaps;
+  prefer_large_heaps();
   BakeOptions options = given;
   options.input = options.inputs.front();
   options.scene.joined_files.assign(options.inputs.begin() + 1, options.inputs.end());

@@ -1,5 +1,8 @@
 #include "runtime/commands/cli/large_heaps.h"
 
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/task_scheduler_observer.h>
+
 #include "pbrt_import/base/large_pages.h"
 
 namespace packtrace {
@@ -8,18 +11,29 @@ namespace {
 constexpr size_t kOwnBytes = 240u << 20;   // enough for scenes of two million triangles
 constexpr size_t kWorkerBytes = 48u << 20; // glibc's heaps of other threads hold up to 64 MiB each
 
+class WorkerObserver : public tbb::task_scheduler_observer {
+public:
+  WorkerObserver() {
+    prefer_large_heap_pages(kOwnBytes);
+    observe(true);
+  }
+
+  void on_scheduler_entry(bool is_worker) override {
+    if (bool& prepared = prepared_.local(); is_worker && !prepared) {
+      prepared = true;
+      prefer_large_heap_pages(kWorkerBytes);
+    }
+  }
+
+private:
+  tbb::enumerable_thread_specific<bool> prepared_{false}; // per worker, as workers enter more than once
+};
+
 } // namespace
 
-LargeHeaps::LargeHeaps() {
-  prefer_large_heap_pages(kOwnBytes);
-  observe(true);
-}
-
-void LargeHeaps::on_scheduler_entry(bool is_worker) {
-  if (bool& prepared = prepared_.local(); is_worker && !prepared) {
-    prepared = true;
-    prefer_large_heap_pages(kWorkerBytes);
-  }
+void prefer_large_heaps() {
+  static const WorkerObserver* const observer = new WorkerObserver; // never destroyed, as workers outlive main()
+  static_cast<void>(observer);
 }
 
 } // namespace packtrace
