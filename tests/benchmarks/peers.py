@@ -6,7 +6,8 @@
     tests/benchmarks/peers.py --folder /tmp/peers --again > peers.md                # only the tables, from the results
 
 DIR holds the folders house, spaceship, bunny and killeroo. With --meshoptimizer, the folder of npm's package, meshes are
-also simplified by its newest version. Results are kept in the folder, one JSON file per program.
+also simplified by its newest version. Results are kept in the folder, one JSON file per program; --resume goes on
+after an interruption.
 """
 import argparse
 import array
@@ -81,24 +82,32 @@ def measure_bakes(options, folder):
 
 
 def measure(options):
-    out = options.folder
+    """Measures what the folder lacks; all of it without --resume."""
+    def needed(name):
+        return not (options.resume and (options.folder / f"{name}.json").exists())
+
+    def benchmark(name, program, *arguments, **environment):
+        if needed(name):
+            run(options, program, *arguments, "--json", options.folder / f"{name}.json", **environment)
+
     rays = ("--cpu-clock", "--threads", 1, "--repeats", 3)
-    run(options, "trace_benchmark", *rays, *SCENES, "--json", out / "rays.json")
-    for name, embree in (("rays_avx2", ()), ("rays_avx2_both", ("--embree-device", "max_isa=avx2"))):
-        run(options, "trace_benchmark", *rays, *SCENES, *embree, "--json", out / f"{name}.json", PACKTRACE_ISA="avx2")
-    run(options, "trace_benchmark", *rays, *LARGE, "--json", out / "rays_large.json")
-    run(options, "trace_benchmark", "--growth", "--cpu-clock", "--repeats", 3, "--json", out / "growth.json")
-    run(options, "packing_benchmark", "--seconds", 0.3, "--generated-triangles", 60000, "bunny", "house", "generated",
-        "--json", out / "packing.json")
-    run(options, "import_benchmark", "--repeats", 7, "--json", out / "import.json")
-    run(options, "lod_benchmark", "--times-only", "--generated-triangles", 60000, "bunny", "spaceship", "generated",
-        "--json", out / "lod_times.json")
-    run(options, "lod_benchmark", "--levels-only", "--samples", 20000, "bunny", "spaceship", "generated", "--class",
-        "all", "--json", out / "lod_levels.json")
+    benchmark("rays", "trace_benchmark", *rays, *SCENES)
+    benchmark("rays_avx2", "trace_benchmark", *rays, *SCENES, PACKTRACE_ISA="avx2")
+    benchmark("rays_avx2_both", "trace_benchmark", *rays, *SCENES, "--embree-device", "max_isa=avx2",
+              PACKTRACE_ISA="avx2")
+    benchmark("rays_large", "trace_benchmark", *rays, *LARGE)
+    benchmark("growth", "trace_benchmark", "--growth", "--cpu-clock", "--repeats", 3)
+    benchmark("packing", "packing_benchmark", "--seconds", 0.3, "--generated-triangles", 60000, "bunny", "house",
+              "generated")
+    benchmark("import", "import_benchmark", "--repeats", 7)
+    benchmark("lod_times", "lod_benchmark", "--times-only", "--generated-triangles", 60000, "bunny", "spaceship",
+              "generated")
+    benchmark("lod_levels", "lod_benchmark", "--levels-only", "--samples", 20000, "bunny", "spaceship", "generated",
+              "--class", "all")
     if options.meshoptimizer:
-        run(options, "lod_benchmark", "--class", "all", "--newest-meshoptimizer", options.meshoptimizer, "--json",
-            out / "lod_classes.json")
-    measure_bakes(options, out)
+        benchmark("lod_classes", "lod_benchmark", "--class", "all", "--newest-meshoptimizer", options.meshoptimizer)
+    if needed("bakes"):
+        measure_bakes(options, options.folder)
 
 
 class Results:
@@ -221,6 +230,7 @@ def main():
     parser.add_argument("--scenes", type=pathlib.Path, default=os.environ.get("PACKTRACE_SCENES", ""))
     parser.add_argument("--folder", type=pathlib.Path, required=True, help="of the results")
     parser.add_argument("--meshoptimizer", help="node_modules/meshoptimizer")
+    parser.add_argument("--resume", action="store_true", help="measure only what the folder lacks")
     parser.add_argument("--again", action="store_true", help="measure nothing")
     options = parser.parse_args()
     options.folder.mkdir(exist_ok=True, parents=True)
