@@ -197,7 +197,7 @@ def time_tables(results):
                 [[name, f"{statistics.median(times):.2f}", f"{min(times):.2f}"]
                  for name, times in bakes.get("wall_s", {}).items()])
     print_table(["all levels, codec none", "bytes per triangle of level 0"],
-                [[name, f"{report['bytes_per_triangle']:.2f}"]
+                [[name, f"{report['lod']['bytes_per_triangle']:.2f}"]
                  for name, report in bakes.get("levels", {}).items()])
 
 
