@@ -13,6 +13,10 @@ namespace {
 
 using K = DirectiveKind;
 
+/// Bytes of small blocks, such as shapes, materials and names, that a directive leaves, apart from arrays of meshes:
+/// more than most, as large pages for too few cost more than a request for too many.
+constexpr uint64_t kDirectiveBytes = 1024;
+
 /// The part of the file in which a directive is allowed.
 enum class Section : uint8_t { kAnywhere, kOptions, kWorld };
 
@@ -54,6 +58,7 @@ bool SceneBuilder::allowed_here(const Directive& directive) {
 
 void SceneBuilder::handle(Directive& directive) {
   ++statistics_.directives;
+  heap_pages_.about_to_allocate(kDirectiveBytes);
   if (!allowed_here(directive)) return;
   if (directive.kind == K::kWorldBegin) return begin_world(directive);
   if (directive.kind == K::kWorldEnd) return end_world(directive.place);

@@ -7,6 +7,7 @@
 
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/help_formatter.h"
+#include "runtime/commands/cli/large_heaps.h"
 #include "runtime/commands/commands.h"
 
 namespace {
@@ -24,6 +25,7 @@ void keep_freed_memory() {
 
 int main(int argc, char** argv) {
   keep_freed_memory();
+  packtrace::prefer_large_heaps();
   packtrace::install_interrupt_handlers();
   CLI::App app("packtrace: bake pbrt-v3 scenes into compact, ray-traceable files and render their ambient occlusion",
                "packtrace");

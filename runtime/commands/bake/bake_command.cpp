@@ -23,7 +23,6 @@
 #include "runtime/commands/cli/binary_output.h"
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/json_output.h"
-#include "runtime/commands/cli/large_heaps.h"
 #include "runtime/commands/cli/loaded_scene.h"
 #include "runtime/commands/cli/option_checks.h"
 #include "runtime/commands/cli/progress_display.h"
@@ -92,7 +91,6 @@ void add_sequences(const BakeOptions& options, const ImportResult& imported, Bak
 }
 
 int run(const BakeOptions& given, const GlobalOptions& globals) {
-  prefer_large_heaps();
   BakeOptions options = given;
   options.input = options.inputs.front();
   options.scene.joined_files.assign(options.inputs.begin() + 1, options.inputs.end());

@@ -1,5 +1,7 @@
 #include "runtime/commands/cli/large_heaps.h"
 
+#include <atomic>
+
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_scheduler_observer.h>
 
@@ -10,6 +12,7 @@ namespace {
 
 constexpr size_t kOwnBytes = 240u << 20;   // enough for scenes of two million triangles
 constexpr size_t kWorkerBytes = 48u << 20; // glibc's heaps of other threads hold up to 64 MiB each
+constexpr uint32_t kMaxWorkers = 15;       // bounds the memory: a worker's heap may take three pages of 2 MiB more
 
 class WorkerObserver : public tbb::task_scheduler_observer {
 public:
@@ -21,12 +24,13 @@ public:
   void on_scheduler_entry(bool is_worker) override {
     if (bool& prepared = prepared_.local(); is_worker && !prepared) {
       prepared = true;
-      prefer_large_heap_pages(kWorkerBytes);
+      if (workers_++ < kMaxWorkers) prefer_large_heap_pages(kWorkerBytes);
     }
   }
 
 private:
   tbb::enumerable_thread_specific<bool> prepared_{false}; // per worker, as workers enter more than once
+  std::atomic<uint32_t> workers_ = 0;
 };
 
 } // namespace
