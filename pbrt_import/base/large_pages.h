@@ -13,9 +13,9 @@ namespace packtrace {
 /// below 8 MiB.
 void prefer_large_pages(void* memory, size_t bytes);
 
-/// Requests large pages for about as many bytes of what malloc returns to the calling thread next. It has an effect
-/// only if malloc keeps freed memory of that size (mallopt(3), M_TRIM_THRESHOLD). Address space is taken at once,
-/// memory when it is first written.
+/// Requests large pages for memory that malloc will return to the calling thread, about `bytes` in total. This works
+/// only if malloc keeps freed blocks of that size (mallopt(3), M_TRIM_THRESHOLD). It reserves address space at once;
+/// the kernel provides memory when a page is first written.
 void prefer_large_heap_pages(size_t bytes);
 
 /// Requests large pages for the small blocks that malloc returns to one thread. Page faults for 4 KiB pages take the

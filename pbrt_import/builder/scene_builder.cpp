@@ -13,8 +13,8 @@ namespace {
 
 using K = DirectiveKind;
 
-/// Bytes of small blocks, such as shapes, materials and names, that a directive leaves, apart from arrays of meshes:
-/// more than most, as large pages for too few cost more than a request for too many.
+/// Estimate of the small allocations per directive: shapes, materials and names, but not the arrays of meshes. It is
+/// higher than most directives need, because unused large pages cost less than page faults.
 constexpr uint64_t kDirectiveBytes = 1024;
 
 /// The part of the file in which a directive is allowed.

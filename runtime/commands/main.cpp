@@ -1,31 +1,13 @@
 #include <memory>
 #include <string>
 
-#include <malloc.h>
-
 #include <CLI/CLI.hpp>
 
 #include "runtime/commands/cli/cli_support.h"
 #include "runtime/commands/cli/help_formatter.h"
-#include "runtime/commands/cli/large_heaps.h"
 #include "runtime/commands/commands.h"
 
-namespace {
-
-/// Lets malloc() keep freed memory for later use. By default glibc returns large blocks to the kernel, which then has
-/// to clear every page of the next frame's buffers: that took an eighth of the time of moving frames.
-void keep_freed_memory() {
-#ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 32 << 20); // the largest that glibc accepts
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
-#endif
-}
-
-} // namespace
-
 int main(int argc, char** argv) {
-  keep_freed_memory();
-  packtrace::prefer_large_heaps();
   packtrace::install_interrupt_handlers();
   CLI::App app("packtrace: bake pbrt-v3 scenes into compact, ray-traceable files and render their ambient occlusion",
                "packtrace");

@@ -229,7 +229,7 @@ void FrameThread::publish(double step_ms) {
   if (contents_shown_) shown->contents = s.contents(0);
   // What came while the frame was rendered is shown by a later one.
   if (started_input_s_ && s.last().moving) shown->input_s = started_input_s_, started_input_s_.reset();
-  // Nobody took the snapshot before: this one is the first that shows its input.
+  // The window never took the previous snapshot, so this one is the first to show the input of both.
   if (snapshot_ && snapshot_.use_count() == 1 && snapshot_->input_s) shown->input_s = snapshot_->input_s;
   shown->number = ++published_;
   shown->frame_ms = step_ms + 1e3 * watch.seconds();

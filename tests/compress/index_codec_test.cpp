@@ -26,7 +26,7 @@ EncodedIndices encode(std::span<const Triangle> triangles, uint32_t vertex_count
   return result;
 }
 
-/// The smallest rotation of a triangle.
+/// Rotates a triangle's corners to the lexicographically smallest order.
 std::array<uint32_t, 3> rotated_to_smallest(Triangle t) {
   return std::min({std::array{t.x, t.y, t.z}, std::array{t.y, t.z, t.x}, std::array{t.z, t.x, t.y}});
 }

@@ -24,6 +24,7 @@
 #include "pbrt_import/base/progress.h"
 #include "runtime/commands/cli/command_line.h"
 #include "runtime/commands/cli/json_output.h"
+#include "runtime/commands/cli/large_heaps.h"
 #include "runtime/commands/cli/option_checks.h"
 #include "runtime/commands/cli/whole_number.h"
 
@@ -86,6 +87,7 @@ int run_words(CLI::App& app, GlobalOptions& globals, std::span<const char* const
     std::optional<tbb::global_control> limit;
     if (const uint32_t threads = thread_limit(globals); threads > 0)
       limit.emplace(tbb::global_control::max_allowed_parallelism, threads);
+    prepare_heaps();
     code = globals.action();
   }
   flush_output();
