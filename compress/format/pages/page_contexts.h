@@ -23,8 +23,11 @@ inline constexpr uint32_t kVersion = kNaming + 36;
 inline constexpr uint32_t kVertexAtPointBack = kVersion + 1;
 inline constexpr uint32_t kBack = kVertexAtPointBack + 1; // 4 kinds of corners
 inline constexpr uint32_t kPageBack = kBack + 4;
+inline constexpr uint32_t kRepeats = kPageBack + 1; // by the value for the last cluster
+// 6 names of the same vertex in the last cluster x 12 states of the guesses
+inline constexpr uint32_t kRepeatedNaming = kRepeats + 2;
 inline constexpr uint32_t kWidths = 46;
-inline constexpr uint32_t kPosition = kPageBack + 1;           // expected width, in halves
+inline constexpr uint32_t kPosition = kRepeatedNaming + 72;    // expected width, in halves
 inline constexpr uint32_t kPositionNear = kPosition + kWidths; // 24 widths of nearby errors x 16 expected errors
 // without guess: 2 kinds of surroundings x 20 spans x 3 levels of surprise
 inline constexpr uint32_t kPositionAlone = kPositionNear + 384;

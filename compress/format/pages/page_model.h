@@ -64,10 +64,6 @@ private:
       c.material = static_cast<uint32_t>(coder_.raw(context::kSameMaterial, c.material, 32));
     c.has_normals = flag(context::kHasNormals + (last_.has_normals ? 1 : 0), c.has_normals) != 0;
     c.has_uvs = flag(context::kHasUvs + (last_.has_uvs ? 1 : 0), c.has_uvs) != 0;
-    if (flag(context::kFull, c.triangle_count == kMaxClusterTriangles) != 0)
-      c.triangle_count = kMaxClusterTriangles;
-    else
-      c.triangle_count = 1 + static_cast<uint32_t>(coder_.raw(context::kFull, c.triangle_count - 1, 7));
     if (c.has_normals) {
       c.normal_chart = coder_.symbol(context::kNormalChart, c.normal_chart);
       c.normal_palette = flag(context::kNormalPalette, c.normal_palette) != 0;

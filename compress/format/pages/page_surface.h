@@ -49,14 +49,18 @@ protected:
     triangles_.clear();
     predictor_.begin();
     cluster_ = 0;
+    last_strips_ = {};
+    repeats_ = false;
     fault_ = false;
   }
 
-  /// Codes the triangles of the next cluster: its turns, corners and positions.
+  /// Codes the triangles of the next cluster: their number, turns, corners and positions.
   void code_triangles(ClusterValues& c) {
     ++cluster_;
     values_ = &c;
     reserve();
+    code_repeat(c);
+    if (!repeats_) code_triangle_count(c);
     const auto first_point = static_cast<uint32_t>(points_.size());
     const uint32_t first_corner = triangles_.count();
     const uint32_t triangle_count = c.triangle_count;
@@ -65,7 +69,9 @@ protected:
     std::array<Corner, 3> t{};
     for (uint32_t i = 0; i < triangle_count && !fault_; ++i) {
       Turn turn = Turn::kRestart;
-      if (i > 0) {
+      if (repeats_) {
+        turn = c.turns[i];
+      } else if (i > 0) {
         const PagePoint &p = points_[t[0].point], &q = points_[t[1].point], &r = points_[t[2].point];
         const uint32_t open = (q.next.has(t[2].point) ? 1u : 0u) + (r.next.has(t[0].point) ? 2u : 0u);
         const uint32_t context = context::kTurn + (open * 8 + p.triangles) * 8 + q.triangles;
@@ -91,6 +97,7 @@ protected:
     c.corner_count = corner_count_;
     c.strip_count = restarts;
     if (fault_) return;
+    if (!repeats_) remember_strips(c);
     code_positions(first_point, first_corner);
     for (uint32_t v = 0; v < vertex_count_; ++v) c.positions[v] = points_[vertices_[v].point].position;
   }
@@ -107,6 +114,41 @@ private:
     uint32_t point = 0;
     uint16_t vertex = 0;
   };
+
+  struct LastStrips {
+    uint32_t triangle_count = 0, corner_count = 0; ///< 0 before the first cluster
+    std::array<Turn, kMaxClusterTriangles> turns;
+    std::array<uint16_t, kMaxClusterCorners> corners;
+  };
+
+  /// Codes whether a cluster has the strips of the last one, as blocks of regular grids do; decoders copy them then.
+  void code_repeat(ClusterValues& c) {
+    const LastStrips& last = last_strips_;
+    const auto same = [&] {
+      return c.triangle_count == last.triangle_count && c.corner_count == last.corner_count &&
+             std::equal(c.turns.begin(), c.turns.begin() + c.triangle_count, last.turns.begin()) &&
+             std::equal(c.corners.begin(), c.corners.begin() + c.corner_count, last.corners.begin());
+    };
+    repeats_ = flag(context::kRepeats + (repeats_ ? 1 : 0), !kDecodes && same()) != 0;
+    if (!kDecodes || !repeats_) return;
+    if (last.triangle_count == 0) fault_ = true;
+    c.triangle_count = last.triangle_count;
+    std::copy_n(last.turns.begin(), last.triangle_count, c.turns.begin());
+    std::copy_n(last.corners.begin(), last.corner_count, c.corners.begin());
+  }
+
+  void code_triangle_count(ClusterValues& c) {
+    if (flag(context::kFull, c.triangle_count == kMaxClusterTriangles) != 0)
+      c.triangle_count = kMaxClusterTriangles;
+    else
+      c.triangle_count = 1 + static_cast<uint32_t>(coder_.raw(context::kFull, c.triangle_count - 1, 7));
+  }
+
+  void remember_strips(const ClusterValues& c) {
+    last_strips_.triangle_count = c.triangle_count, last_strips_.corner_count = c.corner_count;
+    std::copy_n(c.turns.begin(), c.triangle_count, last_strips_.turns.begin());
+    std::copy_n(c.corners.begin(), c.corner_count, last_strips_.corners.begin());
+  }
 
   void reserve() {
     if (points_.capacity() < points_.size() + kMaxClusterVertices)
@@ -147,12 +189,14 @@ private:
     bool fresh = true; ///< whether the corner is the first of a vertex
   };
 
-  /// Returns the name of the next corner; decoders return the default.
+  /// Returns the name of the next corner. Decoders know at most its vertex, if the strips are those of the last
+  /// cluster.
   CornerName name_corner() {
     CornerName name;
+    if (kDecodes && !repeats_) return name;
+    name.vertex = values_->corners[corner_count_];
+    name.fresh = name.vertex == vertex_count_;
     if constexpr (!kDecodes) {
-      name.vertex = values_->corners[corner_count_];
-      name.fresh = name.vertex == vertex_count_;
       name.point = name.fresh ? coder_.find_point(values_->positions[name.vertex]) : vertices_[name.vertex].point;
       if (name.point != kNone)
         name.naming = name.point == guess_[0]                   ? kGuess0
@@ -173,10 +217,16 @@ private:
   Corner code_corner(NameModels names, uint32_t kind, std::array<uint16_t, 2> neighbours, uint32_t opposite) {
     ClusterValues& c = *values_;
     auto [naming, point, vertex, fresh] = name_corner();
+    if (repeats_ && !fresh) {
+      ++corner_count_;
+      return {vertices_[vertex].point, vertex};
+    }
     const bool same = guess_[0] == guess_[1];
     const uint32_t state = guess_state(guess_[0]) * 4 + (same ? 3 : guess_state(guess_[1]));
-    naming = coder_.symbol(names.first + state * names.stride, naming);
-    if (corner_count_ >= kMaxClusterCorners) naming = kInvalidNaming;
+    const uint32_t model =
+        repeats_ ? context::kRepeatedNaming + names_[vertex] * 12 + state : names.first + state * names.stride;
+    naming = coder_.symbol(model, naming);
+    if (corner_count_ >= kMaxClusterCorners || (repeats_ && naming == kOfCluster)) naming = kInvalidNaming;
     switch (naming) {
     case kNewPoint:
       point = add_point();
@@ -185,7 +235,7 @@ private:
     case kGuess1:
       point = guess_[naming - kGuess0];
       if (point == kNone) return fail();
-      if (points_[point].cluster == cluster_)
+      if (points_[point].cluster == cluster_ && !repeats_)
         fresh = code_vertex_at_point(fresh, point, vertex);
       else
         fresh = true;
@@ -215,6 +265,7 @@ private:
       if (vertex_count_ >= kMaxClusterVertices) return fail();
       vertex = static_cast<uint16_t>(vertex_count_++);
       vertices_[vertex] = {point, neighbours, opposite, 0, DVec3(0.0), Vec3(0.0f)};
+      names_[vertex] = static_cast<uint8_t>(naming);
       points_[point].cluster = cluster_;
       points_[point].vertex = vertex;
     }
@@ -280,6 +331,9 @@ private:
   }
 
   uint32_t cluster_ = 0, corner_count_ = 0;
+  bool repeats_ = false; ///< the cluster has the strips of the last one
+  LastStrips last_strips_;
+  std::array<uint8_t, kMaxClusterVertices> names_{}; ///< Naming of each vertex, until then in the last cluster
   std::array<uint32_t, 2> guess_{};
   PageTriangles triangles_;
   PointOrder order_;

@@ -2,7 +2,7 @@
 
 import struct
 
-VERSION = 12
+VERSION = 13
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 576
 NONE = 0xFFFFFFFF

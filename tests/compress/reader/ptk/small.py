@@ -40,6 +40,7 @@ class Vertex:
     point: int
     before: tuple  # vertices of the preceding corners of the triangle that first uses it
     opposite: int  # point across their edge, or None
+    naming: int = NEW  # how its first corner was coded
     direction: tuple = None  # its normal, decoded
 
 
@@ -59,6 +60,7 @@ class SmallCluster:
     places: list = field(default_factory=list)
     normals: list = field(default_factory=list)  # (chart, x, y)
     uvs: list = field(default_factory=list)
+    repeats: int = 0  # has the turns and corners of the cluster before
 
 
 def first_but(ends, other):
@@ -75,6 +77,7 @@ class PageDecoder:
         self.across = []  # per corner, the one that faces the same edge from the other side
         self.number = 0
         self.last = SmallCluster()
+        self.last_vertices = []
         self.place_predictor = PlacePredictor()
         self.predictor = NormalPredictor()
 
@@ -91,7 +94,7 @@ class PageDecoder:
             self.normals()
         if self.c.has_uvs:
             self.uvs()
-        self.last = self.c
+        self.last, self.last_vertices = self.c, self.vertices
         self.number += 1
         return self.c
 
@@ -100,18 +103,25 @@ class PageDecoder:
         c.slot = self.last.slot if values.flag("slot") else values.field(32)
         c.has_normals = values.flag("normals", self.last.has_normals)
         c.has_uvs = values.flag("uvs", self.last.has_uvs)
-        if not values.flag("full"):
-            c.triangle_count = 1 + values.field(7)
         if c.has_normals:
             c.chart = values.symbol("chart")
             c.has_palette = values.flag("palette")
+        c.repeats = values.flag("repeats", self.last.repeats)
+        if c.repeats:
+            if not self.last.triangles:
+                raise BadFile("the first cluster of a page repeats another")
+            c.triangle_count = self.last.triangle_count
+        elif not values.flag("full"):
+            c.triangle_count = 1 + values.field(7)
 
     def triangles(self):
         c = self.c
         t, before = (), 0  # corners as vertices; the point of the last corner
         for i in range(c.triangle_count):
             turn = RESTART
-            if i > 0:
+            if c.repeats:
+                turn = self.last.turns[i]
+            elif i > 0:
                 a, b, last = (self.vertices[v].point for v in t)
                 open_right, open_left = last in self.points[b].ends(), a in self.points[last].ends()
                 counts = self.points[a].triangles, self.points[b].triangles
@@ -148,7 +158,13 @@ class PageDecoder:
 
     def corner(self, guesses, opposite, before, model, kind):
         """Decodes a corner and returns its vertex."""
-        values = self.values
+        values, repeats = self.values, self.c.repeats
+        if repeats:
+            vertex, fresh = self.last.corners[len(self.c.corners)]
+            if not fresh:
+                self.c.corners.append((vertex, fresh))
+                return vertex
+            model = "repeated", self.last_vertices[vertex].naming
         state = tuple(self.state_of(guess) for guess in guesses)
         if guesses[0] == guesses[1]:
             state = state[0], "same"
@@ -159,13 +175,13 @@ class PageDecoder:
             self.points.append(Point())
         elif naming in (FIRST_GUESS, SECOND_GUESS):
             point = guesses[naming - FIRST_GUESS]
-            if self.points[point].cluster == self.number:
+            if self.points[point].cluster == self.number and not repeats:
                 version = values.symbol("version")
                 fresh = version > 1
                 vertex = self.points[point].vertex if version == 0 else None
                 if version == 1:
                     vertex = len(self.vertices) - 1 - values.magnitude("version back")
-        elif naming in (OF_CLUSTER, CREASE):
+        elif naming == CREASE or (naming == OF_CLUSTER and not repeats):
             vertex = len(self.vertices) - 1 - values.magnitude("back", kind)
             point = self.vertices[vertex].point
             fresh = naming == CREASE
@@ -175,7 +191,7 @@ class PageDecoder:
             raise BadFile("a corner without a name")
         if fresh:
             vertex = len(self.vertices)
-            self.vertices.append(Vertex(point, before, opposite))
+            self.vertices.append(Vertex(point, before, opposite, naming))
             self.points[point].cluster, self.points[point].vertex = self.number, vertex
         self.c.corners.append((vertex, fresh))
         return vertex
