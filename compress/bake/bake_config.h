@@ -95,6 +95,11 @@ struct BakeConfig {
 
   /// Compression of pages on disk. Decoded data do not depend on it.
   PageCodec codec = PageCodec::kNone;
+  /// Whether regular grids are cut into equal blocks (regular_blocks.h). Codecs other than kNone store what repeats
+  /// once, so they take half the bytes for grids then. The surface stays the same, but not its clusters and trees.
+  bool equal_blocks = false;
+  /// Sets the codec, and equal_blocks as it takes the fewest bytes.
+  void choose_codec(PageCodec chosen) { codec = chosen, equal_blocks = chosen != PageCodec::kNone; }
 
   bool trees = true; ///< store trees over the clusters; otherwise they are built before tracing
 

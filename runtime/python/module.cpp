@@ -86,7 +86,7 @@ py::object bake(const std::filesystem::path& scene, const std::filesystem::path&
     config.keep_uvs = keep_uvs;
     const std::optional<PageCodec> found = find_page_codec(codec);
     if (!found) throw Error(ErrorKind::kUsage, "codec=\"" + codec + "\": choose one of none, fast, small");
-    config.codec = *found;
+    config.choose_codec(*found);
     config.lod = static_cast<LodUse>(choice("lod", kLodUses, lod));
     config.textures = config.purpose == baked::kShading;
     config.strict = strict;

@@ -42,7 +42,7 @@ public:
     BakeConfig config;
     config.precision_kind = PrecisionKind::kAbsolute;
     config.precision = precision.step;
-    config.codec = wanted_.codec;
+    config.choose_codec(wanted_.codec);
     config.trees = wanted_.trees;
     Diagnostics diagnostics;
     Progress progress;

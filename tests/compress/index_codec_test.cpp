@@ -1,6 +1,7 @@
 #include "compress/format/cluster/index_codec.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -15,8 +16,8 @@ struct EncodedIndices {
   std::vector<uint8_t> bytes; // followed by kReadSlackBytes
 };
 
-EncodedIndices encode(std::span<const Triangle> triangles, uint32_t vertex_count) {
-  EncodedIndices result{find_strips(triangles, vertex_count), {}};
+EncodedIndices encode(Strips strips) {
+  EncodedIndices result{std::move(strips), {}};
   BitWriter writer;
   write_strips(result.strips, writer);
   EXPECT_EQ(writer.bit_count(), result.strips.layout.total_bits());
@@ -26,14 +27,13 @@ EncodedIndices encode(std::span<const Triangle> triangles, uint32_t vertex_count
   return result;
 }
 
-/// Rotates a triangle's corners to the lexicographically smallest order.
-std::array<uint32_t, 3> rotated_to_smallest(Triangle t) {
-  return std::min({std::array{t.x, t.y, t.z}, std::array{t.y, t.z, t.x}, std::array{t.z, t.x, t.y}});
+EncodedIndices encode(std::span<const Triangle> triangles, uint32_t vertex_count) {
+  return encode(find_strips(triangles, vertex_count));
 }
 
 /// Decodes in both ways and compares with the source, up to rotation of each triangle.
-void expect_round_trip(std::span<const Triangle> triangles, uint32_t vertex_count) {
-  const EncodedIndices e = encode(triangles, vertex_count);
+void expect_round_trip(std::span<const Triangle> triangles, Strips strips) {
+  const EncodedIndices e = encode(std::move(strips));
   ASSERT_TRUE(strips_are_valid(e.bytes.data(), e.strips.layout));
   std::vector<Triangle> decoded(triangles.size());
   decode_triangles(e.bytes.data(), e.strips.layout, 0, decoded);
@@ -45,8 +45,12 @@ void expect_round_trip(std::span<const Triangle> triangles, uint32_t vertex_coun
     seen[source] = true;
     const auto& order = e.strips.vertex_order;
     const Triangle t(order[decoded[i].x], order[decoded[i].y], order[decoded[i].z]);
-    EXPECT_EQ(rotated_to_smallest(t), rotated_to_smallest(triangles[source]));
+    EXPECT_EQ(test::rotated_to_smallest(t), test::rotated_to_smallest(triangles[source]));
   }
+}
+
+void expect_round_trip(std::span<const Triangle> triangles, uint32_t vertex_count) {
+  expect_round_trip(triangles, find_strips(triangles, vertex_count));
 }
 
 TEST(IndexCodec, GridsRoundTripAndCostLittle) {
@@ -71,6 +75,18 @@ TEST(IndexCodec, GroupsStayTogether) {
   std::sort(order.begin(), order.end());
   for (uint32_t i = 0; i < 128; ++i) ASSERT_EQ(order[i], i);
   EXPECT_LE(strips.layout.strip_count, find_strips(grid.triangles, 81).layout.strip_count + 8u);
+}
+
+TEST(IndexCodec, StripsInOrderKeepTheOrder) {
+  const Mesh grid = test::grid_mesh(8);
+  test::Random random(4);
+  std::vector<Triangle> soup;
+  for (int i = 0; i < 128; ++i) soup.emplace_back(random.bits() % 9, random.bits() % 9, random.bits() % 9);
+  for (const auto& [triangles, vertex_count] : {std::pair{grid.triangles, 81u}, {soup, 9u}, {{{0, 0, 0}}, 1u}}) {
+    const Strips strips = strips_in_order(triangles, vertex_count);
+    for (uint32_t i = 0; i < triangles.size(); ++i) EXPECT_EQ(strips.triangle_order[i], i);
+    expect_round_trip(triangles, strips);
+  }
 }
 
 TEST(IndexCodec, DegenerateAndRepeatedTrianglesRoundTrip) {

@@ -9,6 +9,7 @@
 #include <tbb/global_control.h>
 
 #include "compress/format/file/file_summary.h"
+#include "compress/format/pages/page_contexts.h"
 #include "compress/format/pages/page_decoder.h"
 #include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/error.h"
@@ -116,6 +117,26 @@ TEST_P(PageCodecs, FilesOfManyPagesAreSmallAndTheSameForAnyThreadCount) {
   if (test::sanitized()) return; // equal bytes for any number of threads are compared in release builds
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
   EXPECT_TRUE(test::bake(scene, config_of(GetParam())).bytes == baked.bytes);
+}
+
+TEST_P(PageCodecs, EqualBlocksComeBack) {
+  BakeConfig config;
+  config.choose_codec(GetParam());
+  const Bytes disk = test::bake(mixed_scene(60), config).bytes;
+  for (const baked::PageRecord& page : pages_of(disk)) EXPECT_EQ(page.form, static_cast<uint32_t>(GetParam()));
+  config.codec = PageCodec::kNone;
+  DiskForm form;
+  EXPECT_TRUE(expand_paged_file(disk, "memory", form) == test::bake(mixed_scene(60), config).bytes);
+}
+
+TEST(SmallPages, RepeatedStripsTakeFewBytes) {
+  BakeConfig config;
+  config.choose_codec(PageCodec::kSmall);
+  const BakedScene baked = test::bake(test::scene_of(test::grid_mesh(128, 0.1f, true)), config);
+  for (const baked::PageRecord& page : pages_of(baked.bytes))
+    EXPECT_EQ(page.form, static_cast<uint32_t>(PageCodec::kSmall));
+  const auto topology = baked.report.file.disk.stream_bytes[static_cast<size_t>(PageStream::kTopology)];
+  EXPECT_LT(8 * topology, 2u * 128 * 128); // bits; about 3 per triangle where no strips repeat
 }
 
 TEST_P(PageCodecs, WhatEncodersDoNotWriteIsStored) {

@@ -73,6 +73,25 @@ TEST(AssetScene, FewerBitsMakeSmallerFilesOfSmoothShapes) {
   }
 }
 
+// Blocks of a grid are equal only where few of its triangles collapse, so files of fewer bits may take more bytes than
+// files of more bits, but never more than without blocks.
+TEST(AssetScene, EqualBlocksNeverTakeMoreBytes) {
+  for (const char* file : {"features/quadrics.pbrt", "features/nurbs.pbrt"}) {
+    const Scene scene = asset(file);
+    for (int bits = 6; bits <= 24; ++bits)
+      for (const PageCodec codec : {PageCodec::kFast, PageCodec::kSmall}) {
+        BakeConfig config;
+        config.precision_kind = PrecisionKind::kPositionBits;
+        config.precision = bits;
+        config.choose_codec(codec);
+        const size_t with_blocks = test::bake(scene, config).bytes.size();
+        config.equal_blocks = false;
+        EXPECT_LE(with_blocks, test::bake(scene, config).bytes.size())
+            << file << ", " << name_of(codec) << ", " << bits;
+      }
+  }
+}
+
 TEST_F(RealScene, FewerBitsMakeSmallerFiles) {
   for (const char* file : {"bunny/scene.pbrt", "killeroo/killeroo-simple.pbrt", "spaceship/scene.pbrt"}) {
     SCOPED_TRACE(file);

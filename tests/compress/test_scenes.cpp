@@ -6,6 +6,10 @@
 
 namespace packtrace::test {
 
+std::array<uint32_t, 3> rotated_to_smallest(const Triangle& t) {
+  return std::min({std::array{t.x, t.y, t.z}, std::array{t.y, t.z, t.x}, std::array{t.z, t.x, t.y}});
+}
+
 uint32_t Random::bits() {
   state_ = state_ * 6364136223846793005u + 1442695040888963407u;
   return static_cast<uint32_t>((state_ ^ (state_ >> 22)) >> 29);

@@ -60,7 +60,7 @@ public:
   void write_all() const {
     for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall}) {
       BakeConfig config = config_;
-      config.codec = codec;
+      config.choose_codec(codec);
       write(config, std::string(name_of(codec)));
       config.lod = LodUse::kAll;
       write(config, std::string(name_of(codec)) + ".lod");

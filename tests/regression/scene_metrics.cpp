@@ -160,8 +160,13 @@ Metrics measure_scene(const std::filesystem::path& scene_file, const PictureSett
   metrics["normal_error_mean_degrees"] = report.mean_normal_error_degrees;
   const BakedFile file = BakedFile::borrow_bytes(baked.bytes, "bake result");
   if (with_sizes) {
-    metrics["bytes_fast"] = static_cast<double>(encode_paged_file(file, PageCodec::kFast).size());
-    metrics["bytes_small"] = static_cast<double>(encode_paged_file(file, PageCodec::kSmall).size());
+    const auto bytes_of = [&](PageCodec codec) {
+      BakeConfig config;
+      config.choose_codec(codec);
+      return static_cast<double>(bake_to_bytes(scene, config, diagnostics, progress).bytes.size());
+    };
+    metrics["bytes_fast"] = bytes_of(PageCodec::kFast);
+    metrics["bytes_small"] = bytes_of(PageCodec::kSmall);
   }
   add_pictures(metrics, scene, file, settings);
   return metrics;

@@ -1,6 +1,7 @@
 #include "compress/bake/clusters/geometry_clusters.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <tuple>
 
@@ -8,6 +9,7 @@
 
 #include "compress/bake/clusters/cluster_cutter.h"
 #include "compress/bake/clusters/morton.h"
+#include "compress/bake/clusters/regular_blocks.h"
 #include "compress/bake/clusters/renumbering.h"
 #include "compress/bake/clusters/triangle_order.h"
 #include "compress/format/layout/baked_format.h"
@@ -99,26 +101,54 @@ std::vector<Chunk> split_into_chunks(std::span<const PlacedTriangle> keys) {
 
 } // namespace
 
-GeometryClusters split_geometry(const QuantizedGeometry& geometry) {
-  const std::vector<PlacedTriangle> keys = sort_triangles(geometry, rank_kinds(geometry.kinds));
+GeometryClusters split_geometry(const QuantizedGeometry& geometry, bool equal_blocks) {
+  const std::vector<uint32_t> rank = rank_kinds(geometry.kinds);
+  const auto rank_of = [&](uint32_t triangle) { return rank[geometry.kind_of[triangle]]; };
+  std::vector<RegularBlock> blocks;
+  if (equal_blocks) blocks = find_regular_blocks(geometry);
+  std::ranges::stable_sort(blocks, {}, [&](const RegularBlock& block) { return rank_of(block.triangles[0]); });
+  std::vector<PlacedTriangle> keys = sort_triangles(geometry, rank);
+  if (!blocks.empty()) {
+    std::vector<uint8_t> in_block(geometry.triangles.size(), 0);
+    for (const RegularBlock& block : blocks)
+      for (uint32_t k = 0; k < block.triangle_count; ++k) in_block[block.triangles[k]] = 1;
+    std::erase_if(keys, [&](const PlacedTriangle& key) { return in_block[key.triangle] != 0; });
+  }
   const std::vector<Chunk> chunks = split_into_chunks(keys);
   std::vector<Clusters> split(chunks.size());
-  GeometryClusters result;
-  result.triangles.resize(keys.size());
+  std::vector<Triangle> rest(keys.size());
   tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
     const Chunk& chunk = chunks[i];
     split[i] = split_chunk(geometry, std::span(keys).subspan(chunk.begin, chunk.end - chunk.begin));
     for (uint32_t k = 0; k < chunk.end - chunk.begin; ++k)
-      result.triangles[chunk.begin + k] = geometry.triangles[keys[chunk.begin + split[i].order[k]].triangle];
+      rest[chunk.begin + k] = geometry.triangles[keys[chunk.begin + split[i].order[k]].triangle];
   });
+
+  GeometryClusters result;
+  result.triangles.reserve(geometry.triangles.size());
+  const auto add = [&](std::span<const Triangle> triangles, uint32_t kind, uint32_t regular) {
+    const auto first = static_cast<uint32_t>(result.triangles.size());
+    result.triangles.insert(result.triangles.end(), triangles.begin(), triangles.end());
+    result.clusters.push_back({first, static_cast<uint32_t>(triangles.size()), kind, regular});
+  };
+  size_t block = 0;
+  const auto add_blocks_up_to = [&](uint32_t last_rank) {
+    for (; block < blocks.size() && rank_of(blocks[block].triangles[0]) <= last_rank; ++block) {
+      std::array<Triangle, kMaxClusterTriangles> triangles;
+      const uint32_t count = blocks[block].triangle_count;
+      for (uint32_t k = 0; k < count; ++k) triangles[k] = blocks[block].triangle(geometry, k);
+      add(std::span(triangles).first(count), geometry.kind_of[blocks[block].triangles[0]], 1);
+    }
+  };
   for (size_t i = 0; i < chunks.size(); ++i) {
-    uint32_t begin = chunks[i].begin;
-    for (const uint32_t end : split[i].ends) {
-      const uint32_t next = chunks[i].begin + end;
-      result.clusters.push_back({begin, next - begin, geometry.kind_of[keys[begin].triangle]});
-      begin = next;
+    const uint32_t first = keys[chunks[i].begin].triangle;
+    add_blocks_up_to(rank_of(first));
+    for (uint32_t begin = 0; const uint32_t end : split[i].ends) {
+      add(std::span(rest).subspan(chunks[i].begin + begin, end - begin), geometry.kind_of[first], 0);
+      begin = end;
     }
   }
+  add_blocks_up_to(static_cast<uint32_t>(rank.size()));
   return result;
 }
 

@@ -64,8 +64,11 @@ private:
     }
     const std::span<const uint32_t> used = numbers_.values;
     for (const uint32_t vertex : used) places_.push_back(geometry_.positions[geometry_.vertices[vertex].position]);
-    groups_.find(places_, local_triangles_);
-    const Strips strips = find_strips(groups_.triangles(), static_cast<uint32_t>(used.size()), groups_.ends());
+    if (cluster.regular == 0) groups_.find(places_, local_triangles_);
+    const std::span<const Triangle> triangles = cluster.regular != 0 ? local_triangles_ : groups_.triangles();
+    const auto vertex_count = static_cast<uint32_t>(used.size());
+    const Strips strips = cluster.regular != 0 ? strips_in_order(triangles, vertex_count)
+                                               : find_strips(triangles, vertex_count, groups_.ends());
 
     positions_.clear(), codes_.clear(), uvs_.clear();
     for (const uint32_t local : strips.vertex_order) {
@@ -82,7 +85,7 @@ private:
 
     for (const uint32_t local : strips.vertex_order) expected_vertices_.push_back(used[local]);
     for (const uint32_t triangle : strips.triangle_order) {
-      const Triangle& t = groups_.triangles()[triangle];
+      const Triangle& t = triangles[triangle];
       expected_triangles_.emplace_back(used[t.x], used[t.y], used[t.z]);
     }
   }

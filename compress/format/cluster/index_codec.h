@@ -56,6 +56,10 @@ class BitWriter;
 Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count,
                    std::span<const uint32_t> group_ends = {});
 
+/// Finds strips that keep the order of the triangles: a strip continues where a triangle shares one of the two exits of
+/// the one before. The limits are those of find_strips().
+Strips strips_in_order(std::span<const Triangle> triangles, uint32_t vertex_count);
+
 void write_strips(const Strips& strips, BitWriter& writer);
 
 /// Decodes all triangles in order into triangles[0..T) and adds `base` to each index.

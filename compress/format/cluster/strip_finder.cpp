@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <optional>
 
 namespace packtrace {
 namespace {
@@ -51,29 +52,64 @@ private:
   std::array<uint16_t, kTableSize> table_;
 };
 
+/// Strips as they are built, triangle by triangle.
+class StripWriter {
+public:
+  StripWriter(size_t triangle_count, uint32_t vertex_count) : number_(vertex_count, ~0u) {
+    const size_t corners = triangle_count + triangle_count / 2;
+    strips_.restart.reserve(triangle_count), strips_.left.reserve(triangle_count);
+    strips_.triangle_order.reserve(triangle_count);
+    strips_.corners.reserve(corners), strips_.vertex_order.reserve(std::min(vertex_count, kMaxClusterVertices));
+  }
+
+  size_t triangle_count() const { return strips_.triangle_order.size(); }
+
+  /// Adds a triangle; its new corners follow.
+  void add_triangle(uint32_t triangle, bool restart, bool left) {
+    strips_.triangle_order.push_back(triangle);
+    strips_.restart.push_back(restart);
+    strips_.left.push_back(left);
+    restart_count_ += restart;
+  }
+
+  void add_corner(uint32_t vertex) {
+    if (number_[vertex] == ~0u) {
+      number_[vertex] = static_cast<uint32_t>(strips_.vertex_order.size());
+      strips_.vertex_order.push_back(vertex);
+    }
+    strips_.corners.push_back(number_[vertex]);
+  }
+
+  Strips finish() {
+    strips_.layout = {static_cast<uint32_t>(triangle_count()), static_cast<uint32_t>(strips_.vertex_order.size()),
+                      restart_count_};
+    return std::move(strips_);
+  }
+
+private:
+  std::vector<uint32_t> number_; // old vertex -> new vertex, ~0 if not used yet
+  uint32_t restart_count_ = 0;
+  Strips strips_;
+};
+
 /// Builds strips greedily. It always moves to the triangle with the fewest unvisited neighbours, so that few triangles
 /// are left isolated. It leaves a group only when all of the group's triangles are visited.
 class StripWalk {
 public:
   StripWalk(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends)
-      : triangles_(triangles), partners_(triangles), number_(vertex_count, ~0u) {
+      : triangles_(triangles), partners_(triangles), strips_(triangles.size(), vertex_count) {
     for (uint32_t group = 0, t = 0; group < group_ends.size(); ++group) {
       group_begin_[group] = static_cast<uint8_t>(t);
       for (; t < group_ends[group]; ++t) group_of_[t] = static_cast<uint8_t>(group), ++left_in_group_[group];
       group_size_[group] = left_in_group_[group];
     }
-    const size_t count = triangles.size(), corners = count + count / 2;
-    strips_.restart.reserve(count), strips_.left.reserve(count), strips_.triangle_order.reserve(count);
-    strips_.corners.reserve(corners), strips_.vertex_order.reserve(std::min(vertex_count, kMaxClusterVertices));
     for (uint32_t t = 0; t < triangles.size(); ++t)
       for (uint32_t e = 0; e < 3; ++e) unvisited_neighbours_[t] += is_in_same_group(t, partners_[3 * t + e]);
   }
 
   Strips run() {
-    while (strips_.triangle_order.size() < triangles_.size()) walk_from(pick_start());
-    strips_.layout = {static_cast<uint32_t>(triangles_.size()), static_cast<uint32_t>(strips_.vertex_order.size()),
-                      restart_count_};
-    return std::move(strips_);
+    while (strips_.triangle_count() < triangles_.size()) walk_from(pick_start());
+    return strips_.finish();
   }
 
 private:
@@ -107,21 +143,13 @@ private:
     for (uint32_t e = 0; e < 3; ++e)
       if (const uint16_t partner = partners_[3 * triangle + e]; is_in_same_group(triangle, partner))
         --unvisited_neighbours_[partner / 3u];
-    strips_.triangle_order.push_back(triangle);
+    strips_.add_triangle(triangle, restart, left);
     group_ = group_of_[triangle];
     --left_in_group_[group_];
-    strips_.restart.push_back(restart);
-    strips_.left.push_back(left);
-    restart_count_ += restart;
   }
 
   void add_corner(uint32_t triangle, uint32_t corner) {
-    const uint32_t vertex = triangles_[triangle][static_cast<int>(corner % 3)];
-    if (number_[vertex] == ~0u) {
-      number_[vertex] = static_cast<uint32_t>(strips_.vertex_order.size());
-      strips_.vertex_order.push_back(vertex);
-    }
-    strips_.corners.push_back(number_[vertex]);
+    strips_.add_corner(triangles_[triangle][static_cast<int>(corner % 3)]);
   }
 
   void walk_from(uint32_t triangle) {
@@ -151,7 +179,6 @@ private:
 
   std::span<const Triangle> triangles_;
   EdgePartners partners_;
-  std::vector<uint32_t> number_; // old vertex -> new vertex, ~0 if not used yet
   std::array<uint8_t, kMaxClusterTriangles>
       unvisited_neighbours_{}; // by triangle: number of unvisited neighbours in its group
   std::array<bool, kMaxClusterTriangles> visited_{};
@@ -159,11 +186,41 @@ private:
   std::array<uint8_t, kMaxClusterTriangles> left_in_group_{};          // by group: number of unvisited triangles
   std::array<uint8_t, kMaxClusterTriangles> group_begin_, group_size_; // by group: range of its triangles
   uint32_t group_ = 0; // group of the last triangle; initially the first group
-  uint32_t restart_count_ = 0;
-  Strips strips_;
+  StripWriter strips_;
 };
 
+/// Returns the third corner of a triangle that has the edge from `from` to `to`.
+std::optional<uint32_t> third_corner(const Triangle& t, uint32_t from, uint32_t to) {
+  for (int e = 0; e < 3; ++e)
+    if (t[e] == from && t[(e + 1) % 3] == to) return t[(e + 2) % 3];
+  return std::nullopt;
+}
+
 } // namespace
+
+Strips strips_in_order(std::span<const Triangle> triangles, uint32_t vertex_count) {
+  assert(!triangles.empty() && triangles.size() <= kMaxClusterTriangles);
+  StripWriter strips(triangles.size(), vertex_count);
+  std::array<uint32_t, 3> last{}; // corners of the last triangle, the newest at the end
+  for (uint32_t i = 0; i < triangles.size(); ++i) {
+    const Triangle& t = triangles[i];
+    const std::optional<uint32_t> right = i == 0 ? std::nullopt : third_corner(t, last[2], last[1]);
+    const std::optional<uint32_t> left = i == 0 ? std::nullopt : third_corner(t, last[0], last[2]);
+    strips.add_triangle(i, !right && !left, !right && left);
+    if (right || left) {
+      last = right ? std::array{last[2], last[1], *right} : std::array{last[0], last[2], *left};
+      strips.add_corner(last[2]);
+      continue;
+    }
+    last = {t.x, t.y, t.z};
+    // The next triangle should be reached by a right turn: across the edge that ends in the newest corner.
+    if (i + 1 < triangles.size())
+      for (uint32_t k = 0; k < 3 && !third_corner(triangles[i + 1], last[2], last[1]); ++k)
+        last = {last[1], last[2], last[0]};
+    for (const uint32_t vertex : last) strips.add_corner(vertex);
+  }
+  return strips.finish();
+}
 
 Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends) {
   assert(!triangles.empty() && triangles.size() <= kMaxClusterTriangles);

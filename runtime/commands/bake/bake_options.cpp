@@ -303,8 +303,8 @@ BakeConfig make_config(const BakeOptions& options) {
   config.sequence_group = options.sequence_group.value_or(config.sequence_group);
   config.resume = options.resume;
   config.trees = options.trees.value_or("on") == "on";
-  config.codec = find_page_codec(options.codec.value_or(std::string(name_of(PageCodec::kNone))))
-                     .value(); // the option's check accepts only these names
+  config.choose_codec(find_page_codec(options.codec.value_or(std::string(name_of(PageCodec::kNone))))
+                          .value()); // the option's check accepts only these names
   config.validate();
   return config;
 }

@@ -1,0 +1,189 @@
+#include "compress/bake/clusters/regular_blocks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+#include <span>
+
+#include <gtest/gtest.h>
+
+#include "compress/bake/clusters/geometry_clusters.h"
+#include "compress/format/file/baked_file.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+/// Vertices at lattice points, each with its own position; one kind.
+QuantizedGeometry geometry_of(std::vector<LatticePoint> positions, std::vector<Triangle> triangles) {
+  QuantizedGeometry geometry;
+  for (uint32_t i = 0; i < positions.size(); ++i) geometry.vertices.push_back({i, 0, {}});
+  geometry.positions = std::move(positions);
+  geometry.kinds.resize(1);
+  geometry.kind_of.assign(triangles.size(), 0);
+  geometry.triangles = std::move(triangles);
+  return geometry;
+}
+
+/// A grid of quads that are all cut along the same diagonal.
+QuantizedGeometry grid(uint32_t columns, uint32_t rows, const std::function<LatticePoint(uint32_t, uint32_t)>& place,
+                       bool closed = false) {
+  const uint32_t width = closed ? columns : columns + 1, height = closed ? rows : rows + 1;
+  std::vector<LatticePoint> positions;
+  for (uint32_t j = 0; j < height; ++j)
+    for (uint32_t i = 0; i < width; ++i) positions.push_back(place(i, j));
+  std::vector<Triangle> triangles;
+  const auto at = [&](uint32_t i, uint32_t j) { return j % height * width + i % width; };
+  for (uint32_t j = 0; j < rows; ++j)
+    for (uint32_t i = 0; i < columns; ++i) {
+      triangles.emplace_back(at(i, j), at(i + 1, j), at(i + 1, j + 1));
+      triangles.emplace_back(at(i + 1, j + 1), at(i, j + 1), at(i, j)); // begins at another corner than blocks do
+    }
+  return geometry_of(std::move(positions), std::move(triangles));
+}
+
+LatticePoint flat(uint32_t i, uint32_t j) { return {100 * int64_t{i}, 100 * int64_t{j}, 0}; }
+
+/// Checks that no triangle is in two blocks. Returns the number of triangles in blocks.
+size_t count_triangles(const QuantizedGeometry& geometry, const std::vector<RegularBlock>& blocks) {
+  std::set<uint32_t> seen;
+  size_t count = 0;
+  for (const RegularBlock& block : blocks) {
+    count += block.triangle_count;
+    EXPECT_LE(block.triangle_count, kMaxClusterTriangles);
+    seen.insert(block.triangles.begin(), block.triangles.begin() + block.triangle_count);
+  }
+  EXPECT_EQ(seen.size(), count);
+  EXPECT_TRUE(seen.empty() || *seen.rbegin() < geometry.triangles.size());
+  return seen.size();
+}
+
+Strips strips_of(const QuantizedGeometry& geometry, const RegularBlock& block) {
+  std::map<uint32_t, uint32_t> numbers;
+  std::vector<Triangle> triangles;
+  for (size_t k = 0; k < block.triangle_count; ++k) {
+    Triangle t = block.triangle(geometry, k);
+    for (int c = 0; c < 3; ++c) t[c] = numbers.try_emplace(t[c], static_cast<uint32_t>(numbers.size())).first->second;
+    triangles.push_back(t);
+  }
+  return strips_in_order(triangles, static_cast<uint32_t>(numbers.size()));
+}
+
+TEST(RegularBlocks, AllBlocksOfAGridHaveTheSameStrips) {
+  test::Random random(1);
+  const QuantizedGeometry geometry = grid(80, 48, [&](uint32_t i, uint32_t j) {
+    return LatticePoint{100 * int64_t{i} + random.bits() % 30, 100 * int64_t{j} + random.bits() % 30,
+                        random.bits() % 80};
+  });
+  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry);
+  EXPECT_EQ(count_triangles(geometry, blocks), geometry.triangles.size());
+  const Strips first = strips_of(geometry, blocks[0]);
+  EXPECT_EQ(first.layout.strip_count, 32u);
+  EXPECT_EQ(first.layout.vertex_count, 81u);
+  for (const RegularBlock& block : blocks) {
+    const Strips strips = strips_of(geometry, block);
+    EXPECT_EQ(strips.corners, first.corners);
+    EXPECT_EQ(strips.left, first.left);
+    EXPECT_EQ(strips.restart, first.restart);
+  }
+}
+
+std::span<const uint32_t> triangles_of(const RegularBlock& block) {
+  return std::span(block.triangles).first(block.triangle_count);
+}
+
+TEST(RegularBlocks, BlocksFillClosedGridsAndAlignWithBorders) {
+  const QuantizedGeometry torus = grid(64, 32, flat, true);
+  EXPECT_GE(count_triangles(torus, find_regular_blocks(torus)), torus.triangles.size() * 9 / 10);
+  const QuantizedGeometry open = grid(35, 19, flat); // 5 x 2 blocks of 7 x 9 quads fit in
+  EXPECT_EQ(count_triangles(open, find_regular_blocks(open)), 10u * 126u);
+  const QuantizedGeometry tube = grid(300, 12, flat, true);
+  EXPECT_GE(count_triangles(tube, find_regular_blocks(tube)), tube.triangles.size() * 9 / 10);
+}
+
+TEST(RegularBlocks, ElongatedQuadsAreGatheredAcross) {
+  for (const bool tall : {false, true}) {
+    const QuantizedGeometry geometry = grid(64, 64, [&](uint32_t i, uint32_t j) {
+      return LatticePoint{int64_t{i} * (tall ? 10 : 50), int64_t{j} * (tall ? 50 : 10), 0};
+    });
+    const std::vector<RegularBlock> blocks = find_regular_blocks(geometry);
+    EXPECT_EQ(count_triangles(geometry, blocks), geometry.triangles.size());
+    for (const RegularBlock& block : blocks) {
+      LatticePoint lo{1 << 20, 1 << 20, 0}, hi{};
+      for (const uint32_t t : triangles_of(block))
+        for (int c = 0; c < 3; ++c)
+          for (size_t axis = 0; axis < 2; ++axis) {
+            const int64_t q = geometry.positions[geometry.triangles[t][c]][axis];
+            lo[axis] = std::min(lo[axis], q), hi[axis] = std::max(hi[axis], q);
+          }
+      EXPECT_EQ(hi[0] - lo[0], tall ? 160 : 200);
+      EXPECT_EQ(hi[1] - lo[1], tall ? 200 : 160);
+    }
+    EXPECT_EQ(strips_of(geometry, blocks[0]).layout.strip_count, 32u);
+  }
+}
+
+TEST(RegularBlocks, KindsAndSplitVerticesEndBlocks) {
+  QuantizedGeometry geometry = grid(32, 32, flat);
+  for (size_t t = 0; t < geometry.triangles.size(); ++t) // columns from 12 on
+    if (t / 2 % 32 >= 12) geometry.kind_of[t] = 1;
+  geometry.kinds.resize(2);
+  for (const RegularBlock& block : find_regular_blocks(geometry))
+    for (const uint32_t t : triangles_of(block)) EXPECT_EQ(geometry.kind_of[t], geometry.kind_of[block.triangles[0]]);
+
+  geometry = grid(32, 32, flat);
+  for (size_t t = 0; t < geometry.triangles.size(); ++t) // own vertices for columns from 12 on
+    for (int c = 0; c < 3; ++c)
+      if (uint32_t& v = geometry.triangles[t][c]; t / 2 % 32 >= 12 && v % 33 == 12) v += 33 * 33;
+  geometry.vertices.resize(2 * geometry.vertices.size());
+  for (size_t v = 0; v < geometry.vertices.size(); ++v)
+    geometry.vertices[v].position = static_cast<uint32_t>(v % geometry.positions.size());
+  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry);
+  EXPECT_GE(count_triangles(geometry, blocks), geometry.triangles.size() * 3 / 4);
+  for (const RegularBlock& block : blocks)
+    EXPECT_LE(2 * strips_of(geometry, block).layout.vertex_count, block.triangle_count + 36u);
+}
+
+TEST(RegularBlocks, IrregularMeshesHaveNone) {
+  test::Random random(2);
+  QuantizedGeometry soup = grid(20, 20, flat);
+  for (Triangle& t : soup.triangles) t = {random.bits() % 441, random.bits() % 441, random.bits() % 441};
+  EXPECT_TRUE(find_regular_blocks(soup).empty());
+  QuantizedGeometry fans = grid(40, 40, flat); // quads with alternating diagonals: valences 4 and 8
+  for (size_t q = 0; q < fans.triangles.size() / 2; ++q) {
+    const auto i = static_cast<uint32_t>(q % 40), j = static_cast<uint32_t>(q / 40), a = j * 41 + i, d = a + 41;
+    if ((i + j) % 2 == 0) fans.triangles[2 * q] = {a, a + 1, d}, fans.triangles[2 * q + 1] = {a + 1, d + 1, d};
+  }
+  EXPECT_TRUE(find_regular_blocks(fans).empty());
+  EXPECT_TRUE(find_regular_blocks({}).empty());
+}
+
+TEST(RegularBlocks, RepeatedAndTurnedTrianglesDoNoHarm) {
+  test::Random random(3);
+  int with_blocks = 0; // rounds
+  for (int round = 0; round < 20; ++round) {
+    QuantizedGeometry geometry = grid(40, 40, flat, round % 2 != 0);
+    for (int k = 0; k < 3; ++k) {
+      Triangle& t = geometry.triangles[random.bits() % geometry.triangles.size()];
+      if (k % 3 == 0) std::swap(t.x, t.y);
+      if (k % 3 == 1) t = geometry.triangles[random.bits() % geometry.triangles.size()];
+      if (k % 3 == 2) t.z = random.bits() % static_cast<uint32_t>(geometry.vertices.size());
+    }
+    const GeometryClusters clusters = split_geometry(geometry, true);
+    std::multiset<std::array<uint32_t, 3>> left;
+    for (const Triangle& t : geometry.triangles) left.insert(test::rotated_to_smallest(t));
+    for (const Triangle& t : clusters.triangles) {
+      const auto found = left.find(test::rotated_to_smallest(t));
+      ASSERT_NE(found, left.end());
+      left.erase(found);
+    }
+    EXPECT_TRUE(left.empty());
+    with_blocks += std::ranges::any_of(clusters.clusters, [](const ClusterRange& c) { return c.regular != 0; });
+  }
+  EXPECT_GT(with_blocks, 10);
+}
+
+} // namespace
+} // namespace packtrace
