@@ -115,40 +115,47 @@ GeometryClusters split_geometry(const QuantizedGeometry& geometry, bool equal_bl
     std::erase_if(keys, [&](const PlacedTriangle& key) { return in_block[key.triangle] != 0; });
   }
   const std::vector<Chunk> chunks = split_into_chunks(keys);
-  std::vector<Clusters> split(chunks.size());
-  std::vector<Triangle> rest(keys.size());
-  tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
-    const Chunk& chunk = chunks[i];
-    split[i] = split_chunk(geometry, std::span(keys).subspan(chunk.begin, chunk.end - chunk.begin));
-    for (uint32_t k = 0; k < chunk.end - chunk.begin; ++k)
-      rest[chunk.begin + k] = geometry.triangles[keys[chunk.begin + split[i].order[k]].triangle];
-  });
 
   GeometryClusters result;
-  result.triangles.reserve(geometry.triangles.size());
-  const auto add = [&](std::span<const Triangle> triangles, uint32_t kind, uint32_t regular) {
-    const auto first = static_cast<uint32_t>(result.triangles.size());
-    result.triangles.insert(result.triangles.end(), triangles.begin(), triangles.end());
-    result.clusters.push_back({first, static_cast<uint32_t>(triangles.size()), kind, regular});
+  result.triangles.resize(geometry.triangles.size());
+  uint32_t first = 0; // index in result.triangles
+  const auto add = [&](uint32_t count, uint32_t kind, uint32_t regular) {
+    result.clusters.push_back({first, count, kind, regular});
+    first += count;
   };
-  size_t block = 0;
+  size_t next_block = 0;
   const auto add_blocks_up_to = [&](uint32_t last_rank) {
-    for (; block < blocks.size() && rank_of(blocks[block].triangles[0]) <= last_rank; ++block) {
-      std::array<Triangle, kMaxClusterTriangles> triangles;
-      const uint32_t count = blocks[block].triangle_count;
-      for (uint32_t k = 0; k < count; ++k) triangles[k] = blocks[block].triangle(geometry, k);
-      add(std::span(triangles).first(count), geometry.kind_of[blocks[block].triangles[0]], 1);
+    for (; next_block < blocks.size() && rank_of(blocks[next_block].triangles[0]) <= last_rank; ++next_block) {
+      const RegularBlock& block = blocks[next_block];
+      for (uint32_t k = 0; k < block.triangle_count; ++k) result.triangles[first + k] = block.triangle(geometry, k);
+      add(block.triangle_count, geometry.kind_of[block.triangles[0]], 1);
     }
   };
+  // Reserve the range of every chunk. The blocks of a kind come before its chunks.
+  std::vector<uint32_t> first_of_chunk;
+  for (const Chunk& chunk : chunks) {
+    add_blocks_up_to(keys[chunk.begin].rank);
+    first_of_chunk.push_back(first);
+    first += chunk.end - chunk.begin;
+  }
+  add_blocks_up_to(static_cast<uint32_t>(rank.size()));
+
+  std::vector<Clusters> split(chunks.size());
+  tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
+    const std::span<const PlacedTriangle> part =
+        std::span(keys).subspan(chunks[i].begin, chunks[i].end - chunks[i].begin);
+    split[i] = split_chunk(geometry, part);
+    for (size_t k = 0; k < part.size(); ++k)
+      result.triangles[first_of_chunk[i] + k] = geometry.triangles[part[split[i].order[k]].triangle];
+  });
   for (size_t i = 0; i < chunks.size(); ++i) {
-    const uint32_t first = keys[chunks[i].begin].triangle;
-    add_blocks_up_to(rank_of(first));
+    first = first_of_chunk[i];
     for (uint32_t begin = 0; const uint32_t end : split[i].ends) {
-      add(std::span(rest).subspan(chunks[i].begin + begin, end - begin), geometry.kind_of[first], 0);
+      add(end - begin, geometry.kind_of[keys[chunks[i].begin].triangle], 0);
       begin = end;
     }
   }
-  add_blocks_up_to(static_cast<uint32_t>(rank.size()));
+  std::ranges::sort(result.clusters, {}, &ClusterRange::first_triangle);
   return result;
 }
 
