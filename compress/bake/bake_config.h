@@ -95,10 +95,10 @@ struct BakeConfig {
 
   /// Compression of pages on disk. Decoded data do not depend on it.
   PageCodec codec = PageCodec::kNone;
-  /// Whether regular grids are cut into equal blocks (regular_blocks.h). Codecs other than kNone store what repeats
-  /// once, so they take half the bytes for grids then. The surface stays the same, but not its clusters and trees.
+  /// Whether to cut regular grids into equal blocks (regular_blocks.h). Codecs fast and small store the topology of
+  /// equal blocks once, which halves the files of grids. It changes clusters and trees, but not the surface.
   bool equal_blocks = false;
-  /// Sets the codec, and equal_blocks as it takes the fewest bytes.
+  /// Sets the codec, and equal_blocks for every codec but kNone.
   void choose_codec(PageCodec chosen) { codec = chosen, equal_blocks = chosen != PageCodec::kNone; }
 
   bool trees = true; ///< store trees over the clusters; otherwise they are built before tracing

@@ -136,7 +136,7 @@ TEST(SmallPages, RepeatedStripsTakeFewBytes) {
   for (const baked::PageRecord& page : pages_of(baked.bytes))
     EXPECT_EQ(page.form, static_cast<uint32_t>(PageCodec::kSmall));
   const auto topology = baked.report.file.disk.stream_bytes[static_cast<size_t>(PageStream::kTopology)];
-  EXPECT_LT(8 * topology, 2u * 128 * 128); // bits; about 3 per triangle where no strips repeat
+  EXPECT_LT(8 * topology, 2u * 128 * 128); // less than one bit per triangle
 }
 
 TEST_P(PageCodecs, WhatEncodersDoNotWriteIsStored) {

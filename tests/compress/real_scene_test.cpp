@@ -73,8 +73,8 @@ TEST(AssetScene, FewerBitsMakeSmallerFilesOfSmoothShapes) {
   }
 }
 
-// Blocks of a grid are equal only where few of its triangles collapse, so files of fewer bits may take more bytes than
-// files of more bits, but never more than without blocks.
+// With few bits, triangles of a grid collapse and its blocks differ from each other. A file can then be larger than one
+// with more bits, but never larger than without blocks.
 TEST(AssetScene, EqualBlocksNeverTakeMoreBytes) {
   for (const char* file : {"features/quadrics.pbrt", "features/nurbs.pbrt"}) {
     const Scene scene = asset(file);

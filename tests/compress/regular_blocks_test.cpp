@@ -16,7 +16,7 @@
 namespace packtrace {
 namespace {
 
-/// Vertices at lattice points, each with its own position; one kind.
+/// Makes a geometry of one kind, with one vertex per position.
 QuantizedGeometry geometry_of(std::vector<LatticePoint> positions, std::vector<Triangle> triangles) {
   QuantizedGeometry geometry;
   for (uint32_t i = 0; i < positions.size(); ++i) geometry.vertices.push_back({i, 0, {}});
@@ -39,7 +39,8 @@ QuantizedGeometry grid(uint32_t columns, uint32_t rows, const std::function<Latt
   for (uint32_t j = 0; j < rows; ++j)
     for (uint32_t i = 0; i < columns; ++i) {
       triangles.emplace_back(at(i, j), at(i + 1, j), at(i + 1, j + 1));
-      triangles.emplace_back(at(i + 1, j + 1), at(i, j + 1), at(i, j)); // begins at another corner than blocks do
+      triangles.emplace_back(at(i + 1, j + 1), at(i, j + 1),
+                             at(i, j)); // starts at a corner that blocks do not start at
     }
   return geometry_of(std::move(positions), std::move(triangles));
 }
@@ -97,7 +98,7 @@ std::span<const uint32_t> triangles_of(const RegularBlock& block) {
 TEST(RegularBlocks, BlocksFillClosedGridsAndAlignWithBorders) {
   const QuantizedGeometry torus = grid(64, 32, flat, true);
   EXPECT_GE(count_triangles(torus, find_regular_blocks(torus)), torus.triangles.size() * 9 / 10);
-  const QuantizedGeometry open = grid(35, 19, flat); // 5 x 2 blocks of 7 x 9 quads fit in
+  const QuantizedGeometry open = grid(35, 19, flat); // holds 5 x 2 blocks of 7 x 9 quads
   EXPECT_EQ(count_triangles(open, find_regular_blocks(open)), 10u * 126u);
   const QuantizedGeometry tube = grid(300, 12, flat, true);
   EXPECT_GE(count_triangles(tube, find_regular_blocks(tube)), tube.triangles.size() * 9 / 10);
@@ -127,14 +128,14 @@ TEST(RegularBlocks, ElongatedQuadsAreGatheredAcross) {
 
 TEST(RegularBlocks, KindsAndSplitVerticesEndBlocks) {
   QuantizedGeometry geometry = grid(32, 32, flat);
-  for (size_t t = 0; t < geometry.triangles.size(); ++t) // columns from 12 on
+  for (size_t t = 0; t < geometry.triangles.size(); ++t) // another kind from column 12 on
     if (t / 2 % 32 >= 12) geometry.kind_of[t] = 1;
   geometry.kinds.resize(2);
   for (const RegularBlock& block : find_regular_blocks(geometry))
     for (const uint32_t t : triangles_of(block)) EXPECT_EQ(geometry.kind_of[t], geometry.kind_of[block.triangles[0]]);
 
   geometry = grid(32, 32, flat);
-  for (size_t t = 0; t < geometry.triangles.size(); ++t) // own vertices for columns from 12 on
+  for (size_t t = 0; t < geometry.triangles.size(); ++t) // separate vertices from column 12 on
     for (int c = 0; c < 3; ++c)
       if (uint32_t& v = geometry.triangles[t][c]; t / 2 % 32 >= 12 && v % 33 == 12) v += 33 * 33;
   geometry.vertices.resize(2 * geometry.vertices.size());
@@ -162,7 +163,7 @@ TEST(RegularBlocks, IrregularMeshesHaveNone) {
 
 TEST(RegularBlocks, RepeatedAndTurnedTrianglesDoNoHarm) {
   test::Random random(3);
-  int with_blocks = 0; // rounds
+  int with_blocks = 0; // number of rounds
   for (int round = 0; round < 20; ++round) {
     QuantizedGeometry geometry = grid(40, 40, flat, round % 2 != 0);
     for (int k = 0; k < 3; ++k) {

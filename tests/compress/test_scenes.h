@@ -19,7 +19,7 @@ Mesh sphere_mesh(uint32_t rings, float radius = 1.0f);
 /// Triangles in [-1,1]^3 without shared vertices. Deterministic.
 Mesh soup_mesh(uint32_t triangles, uint32_t seed);
 
-/// Returns the smallest rotation of a triangle: the same for triangles that differ only in the corner that comes first.
+/// Returns the lexicographically smallest rotation of a triangle's corners, which does not depend on the first corner.
 std::array<uint32_t, 3> rotated_to_smallest(const Triangle& t);
 
 /// Uniform floats in [lo, hi), the same on every platform.

@@ -11,7 +11,7 @@ namespace packtrace {
 struct ClusterRange {
   uint32_t first_triangle = 0, triangle_count = 0; ///< range in GeometryClusters::triangles
   uint32_t kind = 0;                               ///< index into QuantizedGeometry::kinds
-  uint32_t regular = 0;                            ///< 1: the triangles of a RegularBlock, in its order
+  uint32_t regular = 0;                            ///< 1: a RegularBlock, whose triangle order is kept; else 0
 };
 
 /// The triangles of a geometry, cluster by cluster.
@@ -22,7 +22,7 @@ struct GeometryClusters {
 
 /// Splits a geometry into clusters of at most 128 triangles and 256 vertices, ordered by material slot, kind and
 /// position. The result depends on the input only, not on the thread count.
-/// @param equal_blocks whether parts that are regular grids are cut into equal blocks (regular_blocks.h)
+/// @param equal_blocks whether to cut regular grids into equal blocks (regular_blocks.h)
 GeometryClusters split_geometry(const QuantizedGeometry& geometry, bool equal_blocks);
 
 } // namespace packtrace

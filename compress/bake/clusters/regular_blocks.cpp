@@ -12,18 +12,18 @@ namespace {
 
 constexpr uint32_t kNothing = ~0u;
 constexpr uint32_t kRegularValence = 6;
-/// Maximum number of triangles that meet at a vertex on a straight border or at a corner of a grid.
+/// Maximum number of triangles at a vertex on the border of a grid.
 constexpr uint32_t kMaxBorderValence = 3;
 constexpr int32_t kBlockQuads = kMaxClusterTriangles / 2;
-constexpr int32_t kStripQuads = 2;
-constexpr uint32_t kProbe = 512; ///< triangles that show which edges are diagonals
+constexpr int32_t kStripQuads = 2; ///< length of a strip
+constexpr uint32_t kProbe = 512;   ///< number of triangles from which the diagonals of a grid are chosen
 constexpr int32_t kMaxBlockColumns = 32;
-constexpr double kMaxElongation = 2.5; ///< of a block, by the mean lengths of its sides
-constexpr double kBlockCost = 8.0;     ///< of a block without its vertices, in bytes relative to those of a vertex
-constexpr double kRestCost = 1.0;      ///< of a triangle outside all blocks, likewise
-constexpr size_t kFewBlocks = 4;       ///< minimum number of blocks in a part that they do not fill
-/// Factor of the cost of blocks whose number of columns is no power of two. Powers of two divide symmetric shapes
-/// evenly, so their blocks repeat positions as well.
+constexpr double kMaxElongation = 2.5; ///< maximum ratio of a block's sides, from mean edge lengths
+constexpr double kBlockCost = 8.0;     ///< cost of a block apart from its vertices; a vertex costs 1
+constexpr double kRestCost = 1.0;      ///< cost of a triangle outside all blocks
+constexpr size_t kFewBlocks = 4;       ///< minimum number of blocks, unless they fill the whole part
+/// Factor of the cost where the number of columns is not a power of two. Powers of two divide symmetric shapes evenly,
+/// so that the positions of their blocks also repeat.
 constexpr double kOddCost = 1.05;
 constexpr int32_t kMaxCoordinate = 1 << 24;
 
@@ -32,10 +32,10 @@ constexpr int32_t kMaxCoordinate = 1 << 24;
 struct Place {
   int32_t i = 0, j = 0;
   bool upper = false;
-  uint8_t first = 0; ///< the triangle's corner at (i, j)
+  uint8_t first = 0; ///< number of the triangle's corner at grid point (i, j)
 };
 
-/// A triangle's edges by what lies across them: edge e begins at corner first + e.
+/// The edges of a triangle, named by their place in the quad. Edge e goes from corner first + e to the next corner.
 enum Side : uint32_t { kBelow = 0, kRight = 1, kDiagonalOfLower = 2, kDiagonalOfUpper = 0, kAbove = 1, kLeft = 2 };
 
 struct Neighbour {
@@ -96,8 +96,8 @@ private:
     return geometry_.triangles[triangle][static_cast<int>(number % 3)];
   }
 
-  /// Returns the triangle across an edge and the edge's number there, if exactly one triangle of the same kind has it,
-  /// in the opposite direction.
+  /// Returns the triangle across an edge, and the number of this edge in it. Returns nothing unless exactly one other
+  /// triangle has the edge, with the opposite direction and the same kind.
   std::optional<std::pair<uint32_t, uint32_t>> across(uint32_t triangle, uint32_t edge) const {
     const uint32_t from = corner(triangle, edge), to = corner(triangle, edge + 1);
     std::optional<std::pair<uint32_t, uint32_t>> found;
@@ -116,13 +116,14 @@ private:
     return found;
   }
 
-  /// Returns the triangle across a side and its place, if it is regular and not visited yet.
+  /// Returns the triangle across a side, and its place in the grid. Returns nothing if that triangle is not regular or
+  /// was visited before.
   std::optional<Neighbour> enter(uint32_t triangle, uint32_t side) const {
     const Place& from = places_[triangle];
     const auto found = across(triangle, from.first + side);
     if (!found || visited_[found->first] != 0 || !is_regular(found->first)) return std::nullopt;
     Place to{from.i, from.j, !from.upper, 0};
-    uint32_t turn = 0; // corners from the shared edge's first corner in the other triangle to its corner at (i, j)
+    uint32_t turn = 0; // in the other triangle, from the first corner of the shared edge to the corner at (i, j)
     if (!from.upper && side == kBelow) --to.j, turn = 2;
     if (!from.upper && side == kRight) ++to.i, turn = 1;
     if (from.upper && side == kDiagonalOfUpper) turn = 1;
@@ -133,7 +134,7 @@ private:
     return Neighbour{found->first, to};
   }
 
-  /// Visits a neighbour and returns it, or kNothing.
+  /// Visits the triangle across a side and returns it; kNothing if there is none to visit.
   uint32_t step(uint32_t triangle, uint32_t side) {
     const std::optional<Neighbour> next = enter(triangle, side);
     if (!next) return kNothing;
@@ -147,8 +148,10 @@ private:
     part_.push_back(triangle);
   }
 
-  /// Visits the regular triangles that are connected with the seed, row by row, so that a grid that closes on itself is
-  /// cut along its columns. The seed becomes a lower triangle whose given corner comes first.
+  /// Visits the regular triangles that are connected with the seed, row by row. A closed grid, such as a tube, is
+  /// therefore opened along a column. The seed becomes the lower triangle of quad (0, 0).
+  /// @param first number of the seed's corner at grid point (0, 0)
+  /// @param limit stops after a row if at least so many triangles were visited
   void grow(uint32_t seed, uint32_t first, uint32_t limit) {
     part_.clear();
     visit(seed, {0, 0, false, static_cast<uint8_t>(first)});
@@ -173,7 +176,7 @@ private:
     return geometry_.positions[geometry_.vertices[vertex].position];
   }
 
-  /// Returns the mean squared lengths of the edges of the part's lower triangles: along rows, columns, diagonals.
+  /// Returns the mean squared length of the part's edges along rows, along columns, and of the diagonals.
   std::array<double, 3> mean_squares() const {
     std::array<double, 3> sums{};
     double count = 0.0;
@@ -193,8 +196,8 @@ private:
     return sums;
   }
 
-  /// Returns the seed's corner that has to come first so that the longest of the three kinds of edges near by are
-  /// diagonals.
+  /// Returns the corner of the seed that must come first to make diagonals of the longest of the three edge directions
+  /// around the seed.
   uint32_t corner_off_diagonals(uint32_t seed) {
     grow(seed, 0, kProbe);
     const std::array<double, 3> squares = mean_squares();
@@ -203,7 +206,7 @@ private:
     return (longest + 1) % 3; // the diagonal is edge 2
   }
 
-  /// Returns the size of blocks that probably takes the fewest bytes, if there is one that is not too elongated.
+  /// Returns the block size of the least estimated cost. Returns nothing if all sizes exceed kMaxElongation.
   std::optional<Size> choose_size() const {
     const std::array<double, 3> squares = mean_squares();
     std::optional<Size> best;
@@ -222,7 +225,8 @@ private:
     return best;
   }
 
-  /// Cuts the part into blocks, unless they hold less than three fifths of it or are few.
+  /// Cuts the part into blocks. Leaves it whole if blocks would hold less than three fifths of it, or if fewer than
+  /// kFewBlocks would not fill it.
   void cut_blocks() {
     if (part_.size() < kMaxClusterTriangles) return;
     Place lo = places_[part_[0]], hi = lo;
@@ -237,7 +241,7 @@ private:
     for (const uint32_t t : part_) {
       const Place& place = places_[t];
       uint32_t& cell = quads_[cell_of(place.i - lo.i, place.j - lo.j)][place.upper ? 1 : 0];
-      if (cell == kNothing) cell = t; // else the grid overlaps itself
+      if (cell == kNothing) cell = t; // else the grid winds over itself
     }
     sum_full_quads();
     const std::optional<Size> chosen = choose_size();
@@ -252,7 +256,7 @@ private:
         if (count > most) most = count, best = {x, y};
       }
     const size_t quads = most * static_cast<size_t>(size.quads());
-    // What is left of irregular parts is hard to cut, and few blocks have little to repeat.
+    // The triangles between blocks make poor clusters, and a few blocks save too little to make up for it.
     if (10 * quads < 3 * part_.size() || (most < kFewBlocks && 2 * quads < part_.size())) return;
     for_each_full_block(best, size, [&](int32_t x, int32_t y) { add_block(x, y, size); });
   }
@@ -261,7 +265,7 @@ private:
     return static_cast<size_t>(y) * static_cast<size_t>(area_.columns) + static_cast<size_t>(x);
   }
 
-  /// full_[x, y]: number of quads with both triangles in columns below x and rows below y.
+  /// Computes full_[x, y]: the number of quads left of column x and below row y that have both triangles.
   void sum_full_quads() {
     const size_t stride = static_cast<size_t>(area_.columns) + 1;
     full_.assign(stride * (static_cast<size_t>(area_.rows) + 1), 0);
@@ -290,9 +294,9 @@ private:
       }
   }
 
-  /// Adds the block whose first quad is in the given cell. Its strips are kStripQuads long and lie side by side, so
-  /// that a leaf of a tree may be a square of quads: in longer rows that are not along an axis, leaves have large
-  /// boxes.
+  /// Adds the block whose lowest cell is (x, y). Its strips are kStripQuads long and lie side by side, so that 2 x 2
+  /// quads can form a leaf of a tree. Leaves of longer strips are narrow, and have large boxes where the grid is not
+  /// aligned to the axes.
   void add_block(int32_t x, int32_t y, Size size) {
     if (!has_grid_vertices(x, y, size)) return;
     RegularBlock& block = blocks_.emplace_back();
@@ -300,7 +304,7 @@ private:
       block.triangles[block.triangle_count] = t;
       block.first_corner[block.triangle_count++] = places_[t].first;
     };
-    // Exchanging rows with columns and lower with upper triangles keeps all neighbours.
+    // Transposing the grid exchanges lower and upper triangles.
     const bool along_columns = size.columns < size.rows;
     const int32_t length = along_columns ? size.rows : size.columns, strips = size.quads() / length;
     for (int32_t end = length; end > 0; end -= kStripQuads)
@@ -312,9 +316,9 @@ private:
         }
   }
 
-  /// Whether triangles that meet at a point of the block's grid have the same vertex there.
+  /// Returns whether all triangles of the block that meet at a grid point share one vertex there.
   bool has_grid_vertices(int32_t x, int32_t y, Size size) const {
-    std::array<uint32_t, size_t{3} * (kMaxBlockColumns + 1)> vertices; // 2 x 32 quads have most points
+    std::array<uint32_t, size_t{3} * (kMaxBlockColumns + 1)> vertices; // a block of 2 x 32 quads has the most points
     vertices.fill(kNothing);
     const auto put = [&](int32_t column, int32_t row, uint32_t vertex) {
       uint32_t& known = vertices[static_cast<size_t>(row * (size.columns + 1) + column)];
@@ -338,7 +342,7 @@ private:
   std::vector<uint32_t> first_, around_; ///< triangles of vertex v: around_[first_[v]..first_[v+1])
   std::vector<Place> places_;            ///< per triangle, valid if visited
   std::vector<uint8_t> visited_;
-  std::vector<uint32_t> part_; ///< the triangles of the grid at hand
+  std::vector<uint32_t> part_; ///< triangles of the connected part being cut
   Size area_{};
   std::vector<std::array<uint32_t, 2>> quads_; ///< per cell: lower and upper triangle
   std::vector<uint32_t> full_;

@@ -13,10 +13,10 @@ namespace packtrace {
 /// equal strips, which a compressed page stores once.
 struct RegularBlock {
   uint32_t triangle_count = 0;
-  std::array<uint32_t, kMaxClusterTriangles> triangles;   ///< their numbers, in the order of strips_in_order()
-  std::array<uint8_t, kMaxClusterTriangles> first_corner; ///< per triangle: the corner that comes first
+  std::array<uint32_t, kMaxClusterTriangles> triangles;   ///< indices into QuantizedGeometry::triangles, in strip order
+  std::array<uint8_t, kMaxClusterTriangles> first_corner; ///< per triangle: number of its corner that becomes the first
 
-  /// Returns the vertices of triangle number k of the block.
+  /// Returns the vertices of triangle k of the block, beginning with its first corner.
   Triangle triangle(const QuantizedGeometry& geometry, size_t k) const {
     const Triangle& t = geometry.triangles[triangles[k]];
     const int first = first_corner[k];
@@ -24,8 +24,8 @@ struct RegularBlock {
   }
 };
 
-/// Finds disjoint blocks in the regular parts of a mesh, where six triangles meet at a vertex. Returns none if less
-/// than a quarter of the triangles are regular. Blocks next to each other in a grid mostly follow each other.
+/// Finds disjoint blocks in the regular parts of a mesh, where six triangles meet at every vertex. Returns none if the
+/// regular parts have less than a quarter of the triangles. The blocks of a grid are in row order.
 std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry);
 
 } // namespace packtrace

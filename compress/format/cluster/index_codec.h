@@ -56,8 +56,8 @@ class BitWriter;
 Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count,
                    std::span<const uint32_t> group_ends = {});
 
-/// Finds strips that keep the order of the triangles: a strip continues where a triangle shares one of the two exits of
-/// the one before. The limits are those of find_strips().
+/// Makes strips without reordering the triangles. A strip ends where the next triangle does not share one of the two
+/// edges by which the strip can leave the last triangle. The limits are those of find_strips().
 Strips strips_in_order(std::span<const Triangle> triangles, uint32_t vertex_count);
 
 void write_strips(const Strips& strips, BitWriter& writer);

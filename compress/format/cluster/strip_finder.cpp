@@ -52,7 +52,7 @@ private:
   std::array<uint16_t, kTableSize> table_;
 };
 
-/// Strips as they are built, triangle by triangle.
+/// Builds strips triangle by triangle.
 class StripWriter {
 public:
   StripWriter(size_t triangle_count, uint32_t vertex_count) : number_(vertex_count, ~0u) {
@@ -64,7 +64,7 @@ public:
 
   size_t triangle_count() const { return strips_.triangle_order.size(); }
 
-  /// Adds a triangle; its new corners follow.
+  /// Adds a triangle. Call add_corner() for its new corners next: three after a restart, else one.
   void add_triangle(uint32_t triangle, bool restart, bool left) {
     strips_.triangle_order.push_back(triangle);
     strips_.restart.push_back(restart);
@@ -189,7 +189,7 @@ private:
   StripWriter strips_;
 };
 
-/// Returns the third corner of a triangle that has the edge from `from` to `to`.
+/// Returns the third corner of a triangle, if the triangle has the edge from `from` to `to`.
 std::optional<uint32_t> third_corner(const Triangle& t, uint32_t from, uint32_t to) {
   for (int e = 0; e < 3; ++e)
     if (t[e] == from && t[(e + 1) % 3] == to) return t[(e + 2) % 3];
@@ -201,7 +201,7 @@ std::optional<uint32_t> third_corner(const Triangle& t, uint32_t from, uint32_t 
 Strips strips_in_order(std::span<const Triangle> triangles, uint32_t vertex_count) {
   assert(!triangles.empty() && triangles.size() <= kMaxClusterTriangles);
   StripWriter strips(triangles.size(), vertex_count);
-  std::array<uint32_t, 3> last{}; // corners of the last triangle, the newest at the end
+  std::array<uint32_t, 3> last{}; // corners of the last triangle, newest last
   for (uint32_t i = 0; i < triangles.size(); ++i) {
     const Triangle& t = triangles[i];
     const std::optional<uint32_t> right = i == 0 ? std::nullopt : third_corner(t, last[2], last[1]);
@@ -213,7 +213,7 @@ Strips strips_in_order(std::span<const Triangle> triangles, uint32_t vertex_coun
       continue;
     }
     last = {t.x, t.y, t.z};
-    // The next triangle should be reached by a right turn: across the edge that ends in the newest corner.
+    // Rotate the corners so that the next triangle, if it is a neighbour, follows by a right turn.
     if (i + 1 < triangles.size())
       for (uint32_t k = 0; k < 3 && !third_corner(triangles[i + 1], last[2], last[1]); ++k)
         last = {last[1], last[2], last[0]};

@@ -23,8 +23,8 @@ inline constexpr uint32_t kVersion = kNaming + 36;
 inline constexpr uint32_t kVertexAtPointBack = kVersion + 1;
 inline constexpr uint32_t kBack = kVertexAtPointBack + 1; // 4 kinds of corners
 inline constexpr uint32_t kPageBack = kBack + 4;
-inline constexpr uint32_t kRepeats = kPageBack + 1; // by the value for the last cluster
-// 6 names of the same vertex in the last cluster x 12 states of the guesses
+inline constexpr uint32_t kRepeats = kPageBack + 1; // by the flag of the last cluster
+// 6 names that the same vertex had in the last cluster x 12 states of the guesses
 inline constexpr uint32_t kRepeatedNaming = kRepeats + 2;
 inline constexpr uint32_t kWidths = 46;
 inline constexpr uint32_t kPosition = kRepeatedNaming + 72;    // expected width, in halves

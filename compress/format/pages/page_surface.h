@@ -115,13 +115,15 @@ private:
     uint16_t vertex = 0;
   };
 
+  /// Strips of the last cluster of the page.
   struct LastStrips {
     uint32_t triangle_count = 0, corner_count = 0; ///< 0 before the first cluster
     std::array<Turn, kMaxClusterTriangles> turns;
     std::array<uint16_t, kMaxClusterCorners> corners;
   };
 
-  /// Codes whether a cluster has the strips of the last one, as blocks of regular grids do; decoders copy them then.
+  /// Codes whether the cluster has the same strips as the last one, which is true of the blocks of a regular grid. If
+  /// so, decoders copy the last strips.
   void code_repeat(ClusterValues& c) {
     const LastStrips& last = last_strips_;
     const auto same = [&] {
@@ -189,8 +191,7 @@ private:
     bool fresh = true; ///< whether the corner is the first of a vertex
   };
 
-  /// Returns the name of the next corner. Decoders know at most its vertex, if the strips are those of the last
-  /// cluster.
+  /// Returns the name of the next corner. Decoders return the vertex if the strips repeat, else only defaults.
   CornerName name_corner() {
     CornerName name;
     if (kDecodes && !repeats_) return name;
@@ -331,9 +332,10 @@ private:
   }
 
   uint32_t cluster_ = 0, corner_count_ = 0;
-  bool repeats_ = false; ///< the cluster has the strips of the last one
+  bool repeats_ = false; ///< whether the cluster has the same strips as the last one
   LastStrips last_strips_;
-  std::array<uint8_t, kMaxClusterVertices> names_{}; ///< Naming of each vertex, until then in the last cluster
+  std::array<uint8_t, kMaxClusterVertices>
+      names_{}; ///< per vertex: Naming of its first corner; from the last cluster until coded
   std::array<uint32_t, 2> guess_{};
   PageTriangles triangles_;
   PointOrder order_;

@@ -37,7 +37,7 @@ public:
   }
 
 private:
-  tbb::enumerable_thread_specific<bool> prepared_{false}; // per thread; a worker enters several times
+  tbb::enumerable_thread_specific<bool> prepared_{false}; // per thread, because a worker can enter more than once
   std::atomic<uint32_t> workers_ = 0;
 };
 

@@ -32,7 +32,7 @@ protected:
   }
 
   void write(const Scene& scene, BakeConfig config = {}) {
-    config.equal_blocks = true; // of all codecs, because they are expected to hold the same data
+    config.equal_blocks = true; // for every codec, so that all files hold the same clusters
     for (const PageCodec codec : {PageCodec::kFast, PageCodec::kSmall}) {
       config.codec = codec;
       disk_[codec] = test::bake(scene, config).bytes;
