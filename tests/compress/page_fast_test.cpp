@@ -125,6 +125,81 @@ TEST(FastPage, HeadersOutOfRangeAreRefused) {
   EXPECT_FALSE(decodes([](Header& h) { h.escapes[0] = 1; }));
   EXPECT_FALSE(decodes([](Header& h) { h.flags = baked::kClusterHasNormals; }));
   EXPECT_FALSE(decodes([](Header& h) { h.flags = baked::kClusterHasUvs; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.grid = 1; })); // parts would not be used
+}
+
+/// Two squares side by side as grids, encoded by hand. The second shares its left column.
+struct Squares {
+  baked::GeometryRecord geometry{};
+  std::array<Octets, kParts> parts;
+  std::array<Header, 2> headers{};
+
+  Squares() {
+    geometry.cluster_count = 2;
+    for (Header& header : headers) {
+      header.triangles = 1, header.vertices = 3, header.grid = 1;
+      header.position_bits = {4, 3, 0};
+    }
+    headers[1].anchor = {20, 0, 0}; // 10
+    headers[1].neighbour = {1, 0}, headers[1].shared = {1, 0};
+    parts[kFields] = {0x00};
+    // By point (1, 0), (0, 1), (1, 1): x +10, 0, 0, y 0, +6, 0. Then (1, 0), (1, 1): x +9, +1, y 0, -1.
+    parts[kResiduals] = {20, 0, 0, 0, 12, 0, 0, 0, 0, 18, 2, 0, 1, 0, 0};
+  }
+
+  bool decode(std::array<baked::ClusterRecord, 2>& records, Octets& payload) {
+    parts[kHeaders].resize(2 * kHeaderBytes);
+    for (size_t i = 0; i < kHeaderBytes; ++i)
+      for (size_t k = 0; k < 2; ++k) parts[kHeaders][2 * i + k] = reinterpret_cast<const uint8_t*>(&headers[k])[i];
+    const Octets page = page_of(parts);
+    baked::PageRecord page_record{0, static_cast<uint32_t>(page.size()), 16, 2,
+                                  static_cast<uint32_t>(PageCodec::kFast)};
+    payload.assign(16, 0xcc);
+    PageDecoder decoder;
+    return decoder.decode(page_record, page, {{&geometry, 1}, 0, 0}, records, payload);
+  }
+};
+
+TEST(FastPage, GridsWrittenByHandShareABorder) {
+  Squares squares;
+  std::array<baked::ClusterRecord, 2> records;
+  Octets payload;
+  ASSERT_TRUE(squares.decode(records, payload));
+  EXPECT_EQ(records[1].anchor, (std::array<int32_t, 3>{10, 0, 0}));
+  const Strips strips = strips_in_order(std::array{Triangle(0, 1, 3), Triangle(0, 3, 2)}, 4); // of points
+  BitWriter expected;
+  using Points = std::array<std::array<uint32_t, 2>, 4>;
+  for (const Points& points : {Points{{{0, 0}, {10, 0}, {0, 6}, {10, 6}}}, Points{{{0, 0}, {9, 0}, {0, 6}, {10, 5}}}}) {
+    write_strips(strips, expected);
+    for (const uint32_t point : strips.vertex_order)
+      expected.put(points[point][0], 4), expected.put(points[point][1], 3);
+    expected.align(4);
+  }
+  payload.resize(expected.bytes().size());
+  EXPECT_EQ(payload, expected.bytes());
+}
+
+TEST(FastPage, GridsOutOfRangeAreRefused) {
+  const auto decodes = [](auto change) {
+    Squares squares;
+    change(squares.headers[1]);
+    std::array<baked::ClusterRecord, 2> records;
+    Octets payload;
+    return squares.decode(records, payload);
+  };
+  EXPECT_TRUE(decodes([](Header&) {}));
+  EXPECT_FALSE(decodes([](Header& h) { h.grid = 0; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.grid = 2; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.grid = kGridDiagonals; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.grid = 1 | kGridDiagonals; })); // which are not there
+  EXPECT_FALSE(decodes([](Header& h) { h.strips = 1; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.creases = 1; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.neighbour[kLeftColumn] = 0; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.neighbour[kLeftColumn] = 2; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.shared[kLeftColumn] = 1 << kNormals | 1; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.shared[kLowestRow] = 1; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.shared[kLeftColumn] = 8; }));
+  EXPECT_FALSE(decodes([](Header& h) { h.shared = {}; }));
 }
 
 /// Headers of all pages of a scene, in codec fast. Checks that the file is restored bit for bit.
@@ -183,6 +258,20 @@ TEST(FastPage, CreasesShareThePlaceOfAnOlderVertex) {
     }
   const std::vector<Header> headers = headers_of(test::scene_of(split));
   EXPECT_GT(total(headers, [](const Header& h) { return uint32_t{h.creases}; }), 200u);
+}
+
+TEST(FastPage, BlocksOfAGridShareTheirBorders) {
+  BakeConfig config;
+  config.equal_blocks = true;
+  const std::vector<Header> headers = headers_of(test::scene_of(test::grid_mesh(64, 0.1f, true)), config);
+  ASSERT_EQ(headers.size(), 64u); // 8 x 8 blocks
+  const auto shared = [&](GridBorder border, Channel channel) {
+    return total(headers, [&](const Header& h) { return uint32_t{h.shared[border]} >> channel & 1u; });
+  };
+  EXPECT_EQ(total(headers, [](const Header& h) { return uint32_t{h.grid}; }), 64u * 8u);
+  EXPECT_EQ(shared(kLeftColumn, kPositions), 7u * 8u);
+  EXPECT_GE(shared(kLowestRow, kPositions), 6u * 8u); // without blocks that begin a page
+  EXPECT_GT(shared(kLeftColumn, kNormals), 4u * 8u);  // where normals of both blocks have one chart
 }
 
 TEST(FastPage, OutliersAreEscapes) {

@@ -140,9 +140,12 @@ bool PageDecoder::decode(const baked::PageRecord& record, std::span<const uint8_
 }
 
 bool page_record_ok(const baked::PageRecord& record, PageCodec file_codec) {
+  // Files of codec small may have pages of codec fast.
+  const bool known_form = record.form == static_cast<uint32_t>(PageCodec::kNone) ||
+                          record.form == static_cast<uint32_t>(file_codec) ||
+                          (file_codec == PageCodec::kSmall && record.form == static_cast<uint32_t>(PageCodec::kFast));
   return record.payload_bytes > 0 && record.payload_bytes % 4 == 0 && record.payload_bytes <= baked::kMaxPagePayload &&
-         record.cluster_count > 0 && record.cluster_count <= baked::kMaxPageClusters &&
-         (record.form == static_cast<uint32_t>(PageCodec::kNone) || record.form == static_cast<uint32_t>(file_codec)) &&
+         record.cluster_count > 0 && record.cluster_count <= baked::kMaxPageClusters && known_form &&
          record.payload_bytes + record.cluster_count * sizeof(baked::ClusterRecord) <=
              baked::kMaxDiskRatio * record.disk_bytes;
 }

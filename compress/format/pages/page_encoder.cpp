@@ -78,8 +78,7 @@ public:
     page.record.payload_bytes = range.payload_bytes;
     page.record.cluster_count = range.cluster_count;
     StreamBits bits{};
-    page.record.form = static_cast<uint32_t>(codec_);
-    page.bytes = encode(range, bits);
+    encode(page, range, bits);
     page.record.disk_bytes = static_cast<uint32_t>(page.bytes.size());
     if (!decodes_identically(page, range)) store(page, range, bits);
     page.record.hash = XXH3_64bits(page.bytes.data(), page.bytes.size());
@@ -102,8 +101,18 @@ private:
     return sections_.payload.subspan(static_cast<size_t>(range.payload_offset), range.payload_bytes);
   }
 
-  Bytes encode(const PageRange& range, StreamBits& bits) {
-    return codec_ == PageCodec::kSmall ? encode_small(range, bits) : encode_fast(range, bits);
+  /// Codec small uses the form of codec fast for pages that become smaller so, such as grids with alternating
+  /// diagonals.
+  void encode(EncodedPage& page, const PageRange& range, StreamBits& bits) {
+    page.record.form = static_cast<uint32_t>(PageCodec::kFast);
+    page.bytes = encode_fast(range, bits);
+    if (codec_ == PageCodec::kFast) return;
+    StreamBits small_bits{};
+    Bytes small = encode_small(range, small_bits);
+    if (page.bytes.size() < small.size()) return;
+    page.record.form = static_cast<uint32_t>(PageCodec::kSmall);
+    page.bytes = std::move(small);
+    bits = small_bits;
   }
 
   Bytes encode_small(const PageRange& range, StreamBits& bits) {

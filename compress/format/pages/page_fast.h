@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "compress/format/cluster/grid_block.h"
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/cluster/normal_codec.h"
 #include "compress/format/cluster/uv_codec.h"
@@ -24,7 +25,7 @@ namespace packtrace::page_fast {
 enum Part : uint32_t {
   kFields,         ///< bit fields
   kHeaders,        ///< headers of all clusters, transposed: byte 0 of all headers first
-  kBits,           ///< per cluster, each starting at a whole byte: turns, fresh corners, creases
+  kBits,           ///< per cluster, each starting at a whole byte: turns, fresh corners, creases; or diagonals
   kRuns,           ///< triangle count of each strip
   kReusedVertices, ///< vertices of corners that are not fresh, and the originals of creases
   kResiduals,      ///< the byte above the low bits of each residual, in kClasses parts
@@ -36,6 +37,11 @@ inline constexpr uint32_t kClasses = kParts - kResiduals;
 /// coordinates u, v.
 enum Channel : uint32_t { kPositions, kNormals, kUvs, kChannels };
 inline constexpr uint32_t kChannelFields = 3; ///< maximum number of fields per channel
+
+/// Borders of a grid cluster that it can share with an earlier one of the page.
+enum GridBorder : uint32_t { kLeftColumn, kLowestRow, kGridBorders };
+/// The diagonals of the grid are stored, else they are those of the page's last grid; before the first, all are 0.
+inline constexpr uint8_t kGridDiagonals = 128;
 
 /// Header of a cluster. Differences are zigzag numbers relative to the cluster before.
 struct Header {
@@ -52,9 +58,17 @@ struct Header {
   std::array<uint8_t, kChannels> escapes; ///< number of residuals whose value does not fit the low bits and one byte
   std::array<uint8_t, 3> position_bits;
   std::array<uint8_t, 2> normal_bits;
-  std::array<uint8_t, kChannels * kChannelFields> coding; ///< per field: number of low bits, plus 64 times the class
+  std::array<uint8_t, kChannels * kChannelFields - 1>
+      coding; ///< per field: number of low bits, plus 64 times the class
+  /// Columns of the GridBlock whose strips the cluster has, plus kGridDiagonals; 0: the strips are stored. The counts
+  /// of triangles and vertices tell the rows.
+  uint8_t grid;
+  /// Which earlier grid clusters of the page have the points of the left column and of the lowest row, in their right
+  /// column and highest row: how many grid clusters before this one, or 0.
+  std::array<uint8_t, kGridBorders> neighbour;
+  std::array<uint8_t, kGridBorders> shared; ///< bit c: the words of channel c there follow from the neighbour's
 };
-inline constexpr size_t kHeaderBytes = 44;
+inline constexpr size_t kHeaderBytes = 48;
 static_assert(sizeof(Header) == kHeaderBytes && std::is_trivially_copyable_v<Header>);
 
 inline constexpr uint32_t kLowBitsMask = 63, kClassShift = 6;
@@ -87,10 +101,69 @@ inline Layout normal_layout(const baked::GeometryRecord& geometry, const baked::
   return {3, {record.normal_bits[1], record.normal_bits[0], normal_chart_bits(geometry, record)}};
 }
 
+/// Returns the size of a grid cluster, without its diagonals. Returns no quads if no size has these numbers of
+/// triangles and vertices.
+inline GridBlock grid_size(uint8_t grid, uint32_t triangles, uint32_t vertices) {
+  const uint32_t columns = grid & (kGridDiagonals - 1u);
+  if (columns == 0 || triangles % (2 * columns) != 0) return {};
+  const GridBlock block{columns, triangles / (2 * columns), 0};
+  return block.point_count() == vertices ? block : GridBlock{};
+}
+
+/// Least coordinates of the fields of one channel of a cluster, which its words count from.
+using Anchors = std::array<uint64_t, kChannelFields>;
+
+inline Anchors position_anchors(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record) {
+  Anchors anchors;
+  for (size_t i = 0; i < anchors.size(); ++i)
+    anchors[i] = static_cast<uint64_t>(geometry.origin[i]) +
+                 (static_cast<uint64_t>(int64_t{record.anchor[i]}) << geometry.anchor_shift);
+  return anchors;
+}
+
+/// Anchors of the fields of normal_layout(); none for indices of a palette.
+inline Anchors normal_anchors(const baked::ClusterRecord& record) {
+  if (record.normal_palette != 0) return {};
+  return {static_cast<uint64_t>(int64_t{record.normal_anchor[1]} * 2),
+          static_cast<uint64_t>(int64_t{record.normal_anchor[0]} * 2), 0};
+}
+
+/// Layout and anchors of one channel of one cluster.
+struct ChannelFrame {
+  Layout layout;
+  Anchors anchors{};
+
+  /// Whether words of this channel can follow from those of `other`.
+  bool can_share(const ChannelFrame& other) const {
+    return layout.field_count != 0 && layout.field_count == other.layout.field_count && !layout.verbatim() &&
+           !other.layout.verbatim();
+  }
+};
+
 inline uint64_t field_of(const Layout& layout, uint64_t word, uint32_t field) {
   uint32_t shift = 0;
   for (uint32_t i = 0; i < field; ++i) shift += layout.width[i];
   return (word >> shift) & ((uint64_t{1} << layout.width[field]) - 1);
+}
+
+/// Reads the frame of texture coordinates from the bits before their words.
+inline ChannelFrame read_uv_frame(const uint8_t* bits, uint64_t at) {
+  ChannelFrame frame{{2, {}}, {}};
+  for (uint32_t i = 0; i < 2; ++i, at += kUvAnchorBits)
+    frame.anchors[i] =
+        static_cast<uint64_t>(int64_t{static_cast<int32_t>(static_cast<uint32_t>(read_bits(bits, at, kUvAnchorBits)))});
+  for (uint32_t i = 0; i < 2; ++i, at += kUvWidthBits)
+    frame.layout.width[i] = static_cast<uint32_t>(read_bits(bits, at, kUvWidthBits));
+  return frame;
+}
+
+/// Returns the word in frame `to` that has the same coordinates as `word` in frame `from`. Its fields overflow, modulo
+/// 2^64, if they are too narrow.
+inline uint64_t moved_word(const ChannelFrame& from, uint64_t word, const ChannelFrame& to) {
+  uint64_t moved = 0;
+  for (uint32_t i = 0, shift = 0; i < to.layout.field_count; shift += to.layout.width[i], ++i)
+    moved += (field_of(from.layout, word, i) + from.anchors[i] - to.anchors[i]) << shift;
+  return moved;
 }
 
 inline constexpr uint64_t zigzag(int64_t value) {

@@ -15,7 +15,7 @@ using namespace page_fast;
 
 /// Data of the cluster that is being decoded.
 struct FastPageReader::Work {
-  std::array<Layout, kChannels> layouts;
+  GridBorders::Frames frames;
   /// Place of the bits that are copied: palettes; anchors and widths of texture coordinates.
   std::array<uint64_t, kChannels> prefix_bit{};
   std::array<uint32_t, kChannels> prefix_bits{};
@@ -26,6 +26,16 @@ struct FastPageReader::Work {
   WalkMemory::Words residuals{};      ///< residuals of positions, without gaps for creases
   WalkInput input;
   WalkMemory memory;
+
+  bool is_grid = false; ///< the cluster has the strips of `block`, else they are stored
+  GridBlock block;
+  GridStrips strips; ///< of strips_block
+  GridBlock strips_block;
+  GridBorders borders;    ///< of the page
+  uint64_t diagonals = 0; ///< of the page's last grid
+  std::array<std::array<WalkMemory::Words, kGridBorders>, kChannels> shared_words;
+  std::array<SharedBorders, kChannels> shared{};       ///< into shared_words
+  std::array<WalkMemory::Words, kChannels> grid_words; ///< by grid point
 };
 
 FastPageReader::FastPageReader() : work_(std::make_unique<Work>()) {}
@@ -62,6 +72,8 @@ bool FastPageReader::begin(ZSTD_DCtx_s* zstd, std::span<const uint8_t> page, uin
   field_bit_ = 0, field_end_ = 8 * uint64_t{places[kFields].bytes};
   cluster_ = 0, cluster_count_ = cluster_count;
   last_ = {};
+  work_->borders.clear();
+  work_->diagonals = 0;
   payload_.begin(payload_bytes);
   return true;
 }
@@ -138,42 +150,72 @@ bool FastPageReader::read_topology(const Header& header, const IndexLayout& layo
   sum_reused_vertices(reused_vertices, old_count, m.reused_vertices.data());
   w.input = {runs,
              layout.strip_count,
-             {true, w.layouts[kNormals].field_count != 0, w.layouts[kUvs].field_count != 0},
+             {true, w.frames[kNormals].layout.field_count != 0, w.frames[kUvs].layout.field_count != 0},
              header.creases != 0};
+  return true;
+}
+
+/// Finds the strips of a grid cluster, and the words that it shares with earlier ones.
+bool FastPageReader::read_grid(const Header& header, const IndexLayout& layout) {
+  Work& w = *work_;
+  w.block = grid_size(header.grid, layout.triangle_count, layout.vertex_count);
+  if (w.block.columns == 0 || header.creases != 0) return false;
+  if ((header.grid & kGridDiagonals) != 0) {
+    const uint8_t* diagonals = parts_[kBits].take((w.block.quad_count() + 7) / 8);
+    if (diagonals == nullptr) return false;
+    w.diagonals = 0;
+    for (uint32_t i = 0; i < w.block.quad_count(); i += 8) w.diagonals |= uint64_t{diagonals[i / 8]} << i;
+  }
+  w.block.diagonals = w.diagonals;
+  if (w.block != w.strips_block) find_grid_strips(w.block, w.strips);
+  w.strips_block = w.block;
+  if (w.strips.layout.strip_count != layout.strip_count) return false;
+  w.input = {};
+  w.input.has = {true, w.frames[kNormals].layout.field_count != 0, w.frames[kUvs].layout.field_count != 0};
+  w.shared = {};
+  for (const GridBorder border : {kLeftColumn, kLowestRow})
+    for (const Channel channel : {kPositions, kNormals, kUvs}) {
+      if ((header.shared[border] >> channel & 1u) == 0) continue;
+      WalkMemory::Words& words = w.shared_words[channel][border];
+      if (!w.borders.share(border, header.neighbour[border], channel, w.block, w.frames[channel], words.data()))
+        return false;
+      w.shared[channel][border] = words.data();
+    }
   return true;
 }
 
 bool FastPageReader::read_uv_layout(const baked::ClusterRecord& record) {
   Work& w = *work_;
-  w.layouts[kUvs] = {};
+  w.frames[kUvs] = {};
   w.prefix_bits[kUvs] = 0;
   if ((record.flags & baked::kClusterHasUvs) == 0) return true;
   w.prefix_bits[kUvs] = kUvHeaderBits;
   if (!take_bits(w.prefix_bits[kUvs], w.prefix_bit[kUvs])) return false;
-  const uint8_t* bits = parts_[kFields].at;
-  uint64_t at = w.prefix_bit[kUvs] + 2 * kUvAnchorBits;
-  Layout& layout = w.layouts[kUvs];
-  layout.field_count = 2;
-  for (size_t i = 0; i < 2; ++i, at += kUvWidthBits)
-    layout.width[i] = static_cast<uint32_t>(read_bits(bits, at, kUvWidthBits));
+  w.frames[kUvs] = read_uv_frame(parts_[kFields].at, w.prefix_bit[kUvs]);
   return true;
 }
 
 bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32_t vertex_count) {
   Work& w = *work_;
-  const Layout& layout = w.layouts[channel];
+  const Layout& layout = w.frames[channel].layout;
   const uint8_t* bits = parts_[kFields].at;
   const uint8_t creases = channel == kPositions ? header.creases : 0;
   uint64_t* residuals = creases != 0 ? w.residuals.data() : w.memory.residuals[channel].data();
   if (creases >= vertex_count) return false;
-  const uint32_t count = vertex_count - 1 - creases;
+  const SharedBorders shared = w.is_grid ? w.shared[channel] : SharedBorders{};
+  const bool has_first = shared == SharedBorders{};
+  const uint32_t count = has_first
+                             ? vertex_count - 1 - creases
+                             : count_unshared(w.block, shared[kLeftColumn] != nullptr, shared[kLowestRow] != nullptr);
   if (layout.verbatim()) {
     std::fill_n(residuals, vertex_count, uint64_t{0});
     return creases == 0 && take_bits(uint64_t{layout.stride()} * vertex_count, w.verbatim_bit[channel]);
   }
-  uint64_t first = 0;
-  if (!take_bits(layout.stride(), first)) return false;
-  residuals[0] = read_bits(bits, first, layout.stride());
+  if (has_first) {
+    uint64_t first = 0;
+    if (!take_bits(layout.stride(), first)) return false;
+    *residuals++ = read_bits(bits, first, layout.stride());
+  }
   ChannelCode code{layout.field_count, {}, bits, 0, 0};
   for (uint32_t i = 0, shift = 0; i < layout.field_count; shift += layout.width[i], ++i) {
     const uint32_t coding = header.coding[channel * kChannelFields + i], low_bits = coding & kLowBitsMask;
@@ -182,11 +224,11 @@ bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32
     if (code.fields[i].bytes == nullptr || code.low_stride > kMaxFieldBits) return false;
   }
   if (!take_bits(uint64_t{count} * code.low_stride, code.low_bit)) return false;
-  read_residuals_(code, count, residuals + 1);
+  read_residuals_(code, count, residuals);
   for (uint32_t i = 0; i < header.escapes[channel]; ++i)
-    if (!read_escape(code, count, residuals + 1)) return false;
+    if (!read_escape(code, count, residuals)) return false;
   if (creases != 0)
-    expand_residuals(residuals, w.memory.crease.data(), vertex_count, w.memory.residuals[channel].data());
+    expand_residuals(w.residuals.data(), w.memory.crease.data(), vertex_count, w.memory.residuals[channel].data());
   return true;
 }
 
@@ -222,18 +264,24 @@ void FastPageReader::put_bits(const uint8_t* bytes, uint64_t first, uint64_t cou
   payload_.put(read_bits(bytes, first, static_cast<uint32_t>(count)), static_cast<uint32_t>(count));
 }
 
-void FastPageReader::put_cluster(const baked::ClusterRecord& record, const IndexLayout& layout) {
-  Work& w = *work_;
-  put_bits(reinterpret_cast<const uint8_t*>(w.restarts.data()), 0, layout.triangle_count);
-  put_bits(w.turns, 0, layout.triangle_count);
-  put_bits(w.fresh, 0, layout.corner_count());
+void FastPageReader::put_strips(const IndexLayout& layout) {
+  const Work& w = *work_;
+  const auto bytes_of = [](const auto& words) { return reinterpret_cast<const uint8_t*>(words.data()); };
+  put_bits(bytes_of(w.is_grid ? w.strips.restart : w.restarts), 0, layout.triangle_count);
+  put_bits(w.is_grid ? bytes_of(w.strips.left) : w.turns, 0, layout.triangle_count);
+  put_bits(w.is_grid ? bytes_of(w.strips.fresh) : w.fresh, 0, layout.corner_count());
   const uint32_t width = layout.index_bits();
-  const uint8_t* explicits = w.memory.explicits.data();
+  const uint8_t* explicits = w.is_grid ? w.strips.explicits.data() : w.memory.explicits.data();
   const uint32_t count = layout.corner_count() - layout.vertex_count, index_mask = (1u << width) - 1;
   payload_.put_each(count / 4, 4 * width, [&](uint32_t i) { return pack_four(explicits + size_t{4} * i, width); });
   payload_.put_each(count % 4, width, [&](uint32_t i) { return explicits[count / 4 * 4 + i] & index_mask; });
+}
+
+void FastPageReader::put_cluster(const baked::ClusterRecord& record, const IndexLayout& layout) {
+  const Work& w = *work_;
+  put_strips(layout);
   for (uint32_t channel = 0; channel < kChannels; ++channel) {
-    const Layout& one = w.layouts[channel];
+    const Layout& one = w.frames[channel].layout;
     if (one.field_count == 0) continue;
     if (channel != kPositions) put_bits(parts_[kFields].at, w.prefix_bit[channel], w.prefix_bits[channel]);
     if (one.verbatim()) {
@@ -247,23 +295,44 @@ void FastPageReader::put_cluster(const baked::ClusterRecord& record, const Index
   }
 }
 
+/// Reconstructs the words of a grid cluster.
+void FastPageReader::walk_grid_channels() {
+  Work& w = *work_;
+  std::array<const uint64_t*, kChannels> words{};
+  for (uint32_t channel = 0; channel < kChannels; ++channel) {
+    if (!w.input.has[channel] || w.frames[channel].layout.verbatim()) continue;
+    uint64_t* by_point = w.grid_words[channel].data();
+    walk_grid(w.block, w.shared[channel], w.memory.residuals[channel].data(), by_point);
+    for (uint32_t point = 0; point < w.block.point_count(); ++point)
+      w.memory.words[channel][w.strips.vertex_of_point[point]] = by_point[point];
+    words[channel] = by_point;
+  }
+  w.borders.add(w.block, w.frames, words);
+}
+
 bool FastPageReader::append(const baked::GeometryRecord& geometry, baked::ClusterRecord& record) {
   Work& w = *work_;
   const Header header = next_header();
   if (!read_record(header, record)) return false;
   const IndexLayout layout{record.triangle_count, record.vertex_count, record.strip_count};
-  w.layouts[kPositions] = position_layout(record);
-  w.layouts[kNormals] = normal_layout(geometry, record);
-  if (record.normal_palette != 0 && w.layouts[kNormals].field_count == 0) return false;
+  w.frames[kPositions] = {position_layout(record), position_anchors(geometry, record)};
+  w.frames[kNormals] = {normal_layout(geometry, record), normal_anchors(record)};
+  if (record.normal_palette != 0 && w.frames[kNormals].layout.field_count == 0) return false;
   w.prefix_bits[kNormals] = record.normal_palette * (uint32_t{record.normal_bits[0]} + record.normal_bits[1] +
                                                      normal_chart_bits(geometry, record));
-  if (!read_uv_layout(record) || !read_topology(header, layout) || !read_channels(header, record)) return false;
-  walk_strips(w.input, w.memory);
+  if (!read_uv_layout(record)) return false;
+  w.is_grid = header.grid != 0;
+  if (!(w.is_grid ? read_grid(header, layout) : read_topology(header, layout))) return false;
+  if (!read_channels(header, record)) return false;
+  if (w.is_grid)
+    walk_grid_channels();
+  else
+    walk_strips(w.input, w.memory);
 
   uint64_t bits = layout.total_bits();
   for (uint32_t channel = 0; channel < kChannels; ++channel)
-    if (w.layouts[channel].field_count != 0)
-      bits += uint64_t{w.layouts[channel].stride()} * record.vertex_count +
+    if (w.frames[channel].layout.field_count != 0)
+      bits += uint64_t{w.frames[channel].layout.stride()} * record.vertex_count +
               (channel == kPositions ? 0 : w.prefix_bits[channel]);
   if (!payload_.begin_cluster(bits)) return false;
   put_cluster(record, layout);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compress/format/layout/payload_writer.h"
+#include "compress/format/pages/page_fast_grid.h"
 #include "compress/format/pages/page_fast_kernels.h"
 
 struct ZSTD_DCtx_s;
@@ -53,11 +54,14 @@ private:
   page_fast::Header next_header();
   bool read_record(const page_fast::Header& header, baked::ClusterRecord& record);
   bool read_topology(const page_fast::Header& header, const IndexLayout& layout);
+  bool read_grid(const page_fast::Header& header, const IndexLayout& layout);
   bool read_uv_layout(const baked::ClusterRecord& record);
   bool read_channels(const page_fast::Header& header, const baked::ClusterRecord& record);
   bool read_channel(uint32_t channel, const page_fast::Header& header, uint32_t vertex_count);
   bool read_escape(const page_fast::ChannelCode& code, uint32_t count, uint64_t* residuals);
+  void walk_grid_channels();
   void put_bits(const uint8_t* bytes, uint64_t first, uint64_t count);
+  void put_strips(const IndexLayout& layout);
   void put_cluster(const baked::ClusterRecord& record, const IndexLayout& layout);
 
   std::vector<uint8_t> bytes_; ///< all parts, decompressed

@@ -7,7 +7,6 @@
 
 #include <zstd.h>
 
-#include "compress/format/pages/page_cluster.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -18,7 +17,9 @@ namespace {
 
 constexpr uint32_t kByteMask = (1u << kByteBits) - 1;
 constexpr int32_t kNoVertex = -1;
+static_assert(kNoVertex == kNoPoint);
 constexpr uint32_t kMaxEscapes = 255, kMaxCreases = 255;
+constexpr size_t kMaxNeighbour = 255;
 constexpr std::array<PageStream, kChannels> kStreamOf{PageStream::kPositions, PageStream::kNormals, PageStream::kUvs};
 
 void put_bytes(std::vector<uint8_t>& to, const BitWriter& writer) {
@@ -88,7 +89,12 @@ void FastPageWriter::add(const baked::GeometryRecord& geometry, const baked::Clu
   last_reused_ = 0;
   read_vertices(view);
   find_creases(view);
-  add_topology(view);
+  unpack_cluster(view, *values_);
+  is_grid_ = find_grid();
+  if (is_grid_)
+    add_grid(view);
+  else
+    add_topology();
   add_fields(view);
   add_header(record);
 }
@@ -96,23 +102,21 @@ void FastPageWriter::add(const baked::GeometryRecord& geometry, const baked::Clu
 /// Reads the words of each vertex as they are in the cluster's streams.
 void FastPageWriter::read_vertices(const ClusterView& view) {
   const baked::ClusterRecord& record = view.record();
-  layouts_ = {position_layout(record), normal_layout(*geometry_, record), Layout{}};
+  frames_ = {ChannelFrame{position_layout(record), position_anchors(*geometry_, record)},
+             ChannelFrame{normal_layout(*geometry_, record), normal_anchors(record)}, ChannelFrame{}};
   const ClusterView::StreamBits stream = view.stream_bits();
   const uint64_t normal_bit = stream.indices + stream.positions, uv_bit = normal_bit + stream.normals;
   const uint64_t vertex_count = record.vertex_count;
   prefix_bit_ = {stream.indices, normal_bit, uv_bit}, prefix_bits_ = {};
-  prefix_bits_[kNormals] = stream.normals - vertex_count * layouts_[kNormals].stride();
+  prefix_bits_[kNormals] = stream.normals - vertex_count * frames_[kNormals].layout.stride();
   if (view.has_uvs()) {
-    uint64_t at = uv_bit + 2 * kUvAnchorBits;
-    layouts_[kUvs].field_count = 2;
-    for (size_t i = 0; i < 2; ++i, at += kUvWidthBits)
-      layouts_[kUvs].width[i] = static_cast<uint32_t>(read_bits(view.bits(), at, kUvWidthBits));
-    prefix_bits_[kUvs] = at - uv_bit;
+    frames_[kUvs] = read_uv_frame(view.bits(), uv_bit);
+    prefix_bits_[kUvs] = kUvHeaderBits;
   }
   vertices_.assign(static_cast<size_t>(vertex_count), {});
   for (uint32_t channel = 0; channel < kChannels; ++channel) {
-    const uint32_t stride = layouts_[channel].stride();
-    if (layouts_[channel].verbatim()) continue;
+    const uint32_t stride = frames_[channel].layout.stride();
+    if (frames_[channel].layout.verbatim()) continue;
     uint64_t at = prefix_bit_[channel] + prefix_bits_[channel];
     for (Vertex& vertex : vertices_) {
       vertex.words[channel] = read_bits(view.bits(), at, stride);
@@ -123,7 +127,7 @@ void FastPageWriter::read_vertices(const ClusterView& view) {
 
 /// Finds creases: fresh vertices at the position of an earlier one, typically with another normal.
 void FastPageWriter::find_creases(const ClusterView& view) {
-  if (layouts_[kPositions].verbatim()) return;
+  if (frames_[kPositions].layout.verbatim()) return;
   std::map<LatticePoint, uint32_t> places;
   uint32_t count = 0;
   for (uint32_t v = 0; v < vertices_.size(); ++v) {
@@ -143,9 +147,86 @@ void FastPageWriter::find_creases(const ClusterView& view) {
   header_.creases = static_cast<uint8_t>(count);
 }
 
-void FastPageWriter::add_topology(const ClusterView& view) {
-  ClusterValues values;
-  unpack_cluster(view, values);
+/// Finds the GridBlock that has the cluster's strips. Returns false if there is none.
+bool FastPageWriter::find_grid() {
+  if (header_.creases != 0) return false;
+  const ClusterValues& values = *values_;
+  std::array<uint8_t, kMaxClusterTriangles> left;
+  for (uint32_t i = 0; i < values.triangle_count; ++i) left[i] = values.turns[i] == Turn::kLeft;
+  const std::span corners = std::span(values.corners).first(values.corner_count);
+  for (uint32_t columns = 1; 2 * columns <= values.triangle_count; ++columns) {
+    block_ = grid_size(static_cast<uint8_t>(columns), values.triangle_count, values.vertex_count);
+    if (block_.columns == 0) continue;
+    block_.diagonals = diagonals_of(columns, block_.rows, std::span(left).first(values.triangle_count));
+    find_grid_strips(block_, strips_);
+    bool equal = strips_.layout.strip_count == values.strip_count &&
+                 std::ranges::equal(corners, std::span(strips_.corners).first(values.corner_count));
+    for (uint32_t i = 0; i < values.triangle_count && equal; ++i)
+      equal = (strips_.left[i / 64] >> (i % 64) & 1u) == left[i] &&
+              (strips_.restart[i / 64] >> (i % 64) & 1u) == (values.turns[i] == Turn::kRestart ? 1u : 0u);
+    if (equal) return true;
+  }
+  return false;
+}
+
+/// Finds an earlier grid cluster with the same points on a border, and the channels that have equal values there.
+void FastPageWriter::find_neighbour(const ClusterView& view, GridBorder border) {
+  const auto vertex = [&](uint32_t i) {
+    return strips_.vertex_of_point[border == kLeftColumn ? block_.point(0, i) : block_.point(i, 0)];
+  };
+  const auto found = newest_at_[border].find({view.lattice(vertex(0)), view.lattice(vertex(1))});
+  if (found == newest_at_[border].end()) return;
+  const size_t neighbour = borders_.size() + 1 - found->second;
+  if (neighbour > kMaxNeighbour) return;
+  std::array<uint64_t, kMaxClusterVertices> words;
+  for (uint32_t channel = 0; channel < kChannels; ++channel) {
+    const ChannelFrame& frame = frames_[channel];
+    if (!borders_.share(border, neighbour, static_cast<Channel>(channel), block_, frame, words.data())) continue;
+    bool equal = true;
+    for (uint32_t i = 0; i < points_of(block_, border) && equal; ++i)
+      equal = words[i] == vertices_[vertex(i)].words[channel];
+    if (equal) header_.shared[border] = static_cast<uint8_t>(header_.shared[border] | (1u << channel));
+  }
+  if (header_.shared[border] != 0) header_.neighbour[border] = static_cast<uint8_t>(neighbour);
+}
+
+void FastPageWriter::add_grid(const ClusterView& view) {
+  header_.grid = static_cast<uint8_t>(block_.columns);
+  if (block_.diagonals != last_diagonals_) {
+    header_.grid |= kGridDiagonals;
+    BitWriter diagonals;
+    for (uint32_t quad = 0; quad < block_.quad_count(); ++quad) diagonals.put(block_.diagonals >> quad & 1u, 1);
+    diagonals.align(1);
+    put_bytes(parts_[kBits], diagonals);
+    last_diagonals_ = block_.diagonals;
+  }
+  for (const GridBorder border : {kLeftColumn, kLowestRow}) find_neighbour(view, border);
+  const auto& vertex_of = strips_.vertex_of_point;
+  std::array<std::vector<uint64_t>, kChannels> words;
+  std::array<const uint64_t*, kChannels> known{};
+  for (uint32_t channel = 0; channel < kChannels; ++channel) {
+    if (frames_[channel].layout.field_count == 0 || frames_[channel].layout.verbatim()) continue;
+    const auto is_shared = [&](GridBorder border) { return (header_.shared[border] >> channel & 1u) != 0; };
+    for (uint32_t y = is_shared(kLowestRow) ? 1 : 0; y <= block_.rows; ++y)
+      for (uint32_t x = is_shared(kLeftColumn) ? 1 : 0; x <= block_.columns; ++x) {
+        if (x + y == 0) continue;
+        std::array<int32_t, 3> guess = grid_guess(block_, x, y);
+        for (int32_t& point : guess)
+          if (point != kNoPoint) point = vertex_of[static_cast<size_t>(point)];
+        add_residuals(channel, vertex_of[block_.point(x, y)], guess);
+      }
+    for (uint32_t point = 0; point < block_.point_count(); ++point)
+      words[channel].push_back(vertices_[vertex_of[point]].words[channel]);
+    known[channel] = words[channel].data();
+  }
+  borders_.add(block_, frames_, known);
+  const auto point = [&](uint32_t x, uint32_t y) { return view.lattice(vertex_of[block_.point(x, y)]); };
+  newest_at_[kLeftColumn][{point(block_.columns, 0), point(block_.columns, 1)}] = borders_.size();
+  newest_at_[kLowestRow][{point(0, block_.rows), point(1, block_.rows)}] = borders_.size();
+}
+
+void FastPageWriter::add_topology() {
+  const ClusterValues& values = *values_;
   BitWriter turns, fresh, creases;
   std::array<int32_t, 3> t{kNoVertex, kNoVertex, kNoVertex};
   uint32_t corner = 0, used = 0;
@@ -186,23 +267,23 @@ void FastPageWriter::add_corner(uint32_t vertex, bool fresh, std::array<int32_t,
     parts_[kReusedVertices].push_back(static_cast<uint8_t>(zigzag(difference)));
     last_reused_ = named;
   }
-  if (fresh && vertex > 0) add_residuals(vertex, guess);
+  if (!fresh || vertex == 0) return;
+  for (uint32_t channel = 0; channel < kChannels; ++channel)
+    if (channel != kPositions || !one.is_crease) add_residuals(channel, vertex, guess);
 }
 
-void FastPageWriter::add_residuals(uint32_t vertex, std::array<int32_t, 3> guess) {
-  const Vertex& one = vertices_[vertex];
-  for (uint32_t channel = 0; channel < kChannels; ++channel) {
-    const Layout& layout = layouts_[channel];
-    if ((channel == kPositions && one.is_crease) || layout.verbatim()) continue;
-    for (uint32_t i = 0; i < layout.field_count; ++i) {
-      const auto value = [&](int32_t v) {
-        return v == kNoVertex
-                   ? 0
-                   : static_cast<int64_t>(field_of(layout, vertices_[static_cast<size_t>(v)].words[channel], i));
-      };
-      residuals_[channel * kChannelFields + i].push_back(
-          zigzag(value(static_cast<int32_t>(vertex)) - (value(guess[0]) + value(guess[1]) - value(guess[2]))));
-    }
+/// @param guess vertices p, q, o of the prediction p + q - o; kNoVertex means 0
+void FastPageWriter::add_residuals(uint32_t channel, uint32_t vertex, std::array<int32_t, 3> guess) {
+  const Layout& layout = frames_[channel].layout;
+  if (layout.verbatim()) return;
+  for (uint32_t i = 0; i < layout.field_count; ++i) {
+    const auto value = [&](int32_t v) {
+      return v == kNoVertex
+                 ? 0
+                 : static_cast<int64_t>(field_of(layout, vertices_[static_cast<size_t>(v)].words[channel], i));
+    };
+    residuals_[channel * kChannelFields + i].push_back(
+        zigzag(value(static_cast<int32_t>(vertex)) - (value(guess[0]) + value(guess[1]) - value(guess[2]))));
   }
 }
 
@@ -218,21 +299,23 @@ void FastPageWriter::add_fields(const ClusterView& view) {
   copy_bits(view, kUvs, prefix_bit_[kUvs], prefix_bits_[kUvs]);
   copy_bits(view, kNormals, prefix_bit_[kNormals], prefix_bits_[kNormals]);
   for (const Channel channel : {kPositions, kNormals, kUvs}) {
-    const Layout& layout = layouts_[channel];
+    const Layout& layout = frames_[channel].layout;
     if (layout.field_count == 0) continue;
     if (layout.verbatim()) {
       copy_bits(view, channel, prefix_bit_[channel] + prefix_bits_[channel],
                 uint64_t{layout.stride()} * vertices_.size());
       continue;
     }
-    put(channel, vertices_[0].words[channel], layout.stride());
+    const bool is_shared = ((header_.shared[kLeftColumn] | header_.shared[kLowestRow]) >> channel & 1u) != 0;
+    const uint32_t first = is_grid_ ? strips_.vertex_of_point[0] : 0;
+    if (!is_shared) put(channel, vertices_[first].words[channel], layout.stride());
     code_channel(channel);
     put_escapes(channel);
   }
 }
 
 void FastPageWriter::code_channel(Channel channel) {
-  const uint32_t first = channel * kChannelFields, field_count = layouts_[channel].field_count;
+  const uint32_t first = channel * kChannelFields, field_count = frames_[channel].layout.field_count;
   std::array<uint32_t, kChannelFields> low_bits{};
   for (uint32_t i = 0; i < field_count; ++i) {
     const std::vector<uint64_t>& residuals = residuals_[first + i];

@@ -2,13 +2,16 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "compress/format/cluster/cluster_codec.h"
 #include "compress/format/layout/bit_stream.h"
+#include "compress/format/pages/page_cluster.h"
 #include "compress/format/pages/page_contexts.h"
-#include "compress/format/pages/page_fast.h"
+#include "compress/format/pages/page_fast_grid.h"
 
 struct ZSTD_CCtx_s;
 
@@ -44,9 +47,12 @@ private:
 
   void read_vertices(const ClusterView& view);
   void find_creases(const ClusterView& view);
-  void add_topology(const ClusterView& view);
+  bool find_grid();
+  void find_neighbour(const ClusterView& view, page_fast::GridBorder border);
+  void add_grid(const ClusterView& view);
+  void add_topology();
   void add_corner(uint32_t vertex, bool fresh, std::array<int32_t, 3> guess);
-  void add_residuals(uint32_t vertex, std::array<int32_t, 3> guess);
+  void add_residuals(uint32_t channel, uint32_t vertex, std::array<int32_t, 3> guess);
   void add_fields(const ClusterView& view);
   void copy_bits(const ClusterView& view, page_fast::Channel channel, uint64_t first, uint64_t count);
   void code_channel(page_fast::Channel channel);
@@ -63,10 +69,19 @@ private:
 
   const baked::GeometryRecord* geometry_ = nullptr;
   baked::ClusterRecord last_{};
+  uint64_t last_diagonals_ = 0; ///< of the page's last grid cluster
+  page_fast::GridBorders borders_;
+  /// The newest grid cluster by the first two points on a border that later ones can share: number of the page's grid
+  /// clusters up to it.
+  std::array<std::map<std::array<LatticePoint, 2>, size_t>, page_fast::kGridBorders> newest_at_;
 
   // State of the current cluster.
   page_fast::Header header_{};
-  std::array<page_fast::Layout, page_fast::kChannels> layouts_;
+  page_fast::GridBorders::Frames frames_;
+  std::unique_ptr<ClusterValues> values_ = std::make_unique<ClusterValues>();
+  bool is_grid_ = false; ///< the strips are those of block_
+  GridBlock block_;
+  GridStrips strips_;
   std::array<uint64_t, page_fast::kChannels> prefix_bit_{}, prefix_bits_{};
   std::vector<Vertex> vertices_;
   uint32_t last_reused_ = 0;

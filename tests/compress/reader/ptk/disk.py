@@ -14,6 +14,7 @@ HEADER = Record(
     ("node_form", "I"), ("reserved", "I"), ("motion_bytes", "Q"), ("zeros", "32s"), ("table_hash", "Q"), ("header_hash", "Q"))
 PAGE = Record(("hash", "Q"), ("disk_bytes", "I"), ("payload_bytes", "I"), ("clusters", "I"), ("form", "I"))
 PAGE_DECODERS = {1: fast.decode_page, 2: small.decode_page}
+PAGE_FORMS = {1: (1,), 2: (1, 2)}  # by codec; form 0 is allowed in all
 SECTION_NAMES = [name for name, _ in SECTIONS]
 
 
@@ -30,9 +31,9 @@ def clusters_of_page(data, page, geometries, codec, payload_begin):
         plain = decompress(data, page["clusters"] * CLUSTER.layout.size + page["payload_bytes"])
         records = CLUSTER.read_all(plain[: page["clusters"] * CLUSTER.layout.size])
         return records, plain[page["clusters"] * CLUSTER.layout.size :]
-    if page["form"] != codec:
-        raise BadFile("a page of another codec than the file's")
-    clusters = PAGE_DECODERS[codec](data, geometries)
+    if page["form"] not in PAGE_FORMS[codec]:
+        raise BadFile("a page of a form that the file's codec does not have")
+    clusters = PAGE_DECODERS[page["form"]](data, geometries)
     payload = b""
     for cluster, geometry in zip(clusters, geometries):
         cluster.record["payload_offset"] = (payload_begin + len(payload) - geometry["payload_offset"]) // 4

@@ -2,7 +2,7 @@
 
 import struct
 
-VERSION = 13
+VERSION = 14
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 576
 NONE = 0xFFFFFFFF
