@@ -7,16 +7,21 @@
 #include <optional>
 #include <utility>
 
+#include "compress/format/cluster/grid_block.h"
+
 namespace packtrace {
 namespace {
 
 constexpr uint32_t kNothing = ~0u;
+/// Number of triangles at a vertex inside a grid whose quads all have the same diagonal.
 constexpr uint32_t kRegularValence = 6;
+/// Numbers of triangles at vertices inside a grid with alternating diagonals: at points where diagonals end, and at
+/// those between them.
+constexpr uint32_t kDiagonalValence = 8, kPlainValence = 4;
 /// Maximum number of triangles at a vertex on the border of a grid.
-constexpr uint32_t kMaxBorderValence = 3;
+constexpr uint32_t kMaxBorderValence = 3, kMaxDiagonalBorderValence = 4, kMaxPlainBorderValence = 2;
 constexpr int32_t kBlockQuads = kMaxClusterTriangles / 2;
-constexpr int32_t kStripQuads = 2; ///< length of a strip
-constexpr uint32_t kProbe = 512;   ///< number of triangles from which the diagonals of a grid are chosen
+constexpr uint32_t kProbe = 512; ///< number of triangles from which the diagonals of a grid are chosen
 constexpr int32_t kMaxBlockColumns = 32;
 constexpr double kMaxElongation = 2.5; ///< maximum ratio of a block's sides, from mean edge lengths
 constexpr double kBlockCost = 8.0;     ///< cost of a block apart from its vertices; a vertex costs 1
@@ -25,18 +30,42 @@ constexpr size_t kFewBlocks = 4;       ///< minimum number of blocks, unless the
 /// Factor of the cost where the number of columns is not a power of two. Powers of two divide symmetric shapes evenly,
 /// so that the positions of their blocks also repeat.
 constexpr double kOddCost = 1.05;
+/// Twice the number of edges other than diagonals at a vertex inside a grid, and its maximum on the border, where an
+/// edge of one triangle counts once.
+constexpr uint32_t kInnerSides = 8, kMaxBorderSides = 4;
+/// Limits for the square of the longest edge divided by those of the other two. It is 1 in halves of a rectangle.
+constexpr double kMinRightAngle = 0.8, kMaxRightAngle = 1.25;
 constexpr int32_t kMaxCoordinate = 1 << 24;
 
-/// A triangle's place in the grid. With corners in counterclockwise order, the lower triangle of quad (i, j) is
-/// (i, j), (i+1, j), (i+1, j+1), the upper one (i, j), (i+1, j+1), (i, j+1).
+/// A triangle's place in the grid.
 struct Place {
-  int32_t i = 0, j = 0;
+  int32_t i = 0, j = 0; ///< column and row of its quad
   bool upper = false;
-  uint8_t first = 0; ///< number of the triangle's corner at grid point (i, j)
+  uint8_t diagonal = 0; ///< of its quad
+  uint8_t first = 0;    ///< number of the triangle's corner that is corner 0 of the QuadTriangle
+
+  const QuadTriangle& shape() const { return kQuadTriangles[diagonal][upper ? 1 : 0]; }
 };
 
-/// The edges of a triangle, named by their place in the quad. Edge e goes from corner first + e to the next corner.
-enum Side : uint32_t { kBelow = 0, kRight = 1, kDiagonalOfLower = 2, kDiagonalOfUpper = 0, kAbove = 1, kLeft = 2 };
+/// How the diagonals of a grid lie: all alike, alternating, or each on the longest edge of its two triangles.
+enum class Diagonals { kEqual, kAlternating, kLongestEdges };
+
+/// Returns the edge of the neighbouring quad, or other triangle, that coincides with an edge.
+QuadEdge opposite(QuadEdge edge) {
+  switch (edge) {
+  case QuadEdge::kBelow:
+    return QuadEdge::kAbove;
+  case QuadEdge::kAbove:
+    return QuadEdge::kBelow;
+  case QuadEdge::kLeft:
+    return QuadEdge::kRight;
+  case QuadEdge::kRight:
+    return QuadEdge::kLeft;
+  case QuadEdge::kDiagonal:
+    break;
+  }
+  return QuadEdge::kDiagonal;
+}
 
 struct Neighbour {
   uint32_t triangle;
@@ -59,22 +88,43 @@ public:
     for (const Triangle& t : geometry_.triangles)
       for (int corner = 0; corner < 3; ++corner) ++valence_[t[corner]];
     const auto count = static_cast<uint32_t>(geometry_.triangles.size());
-    const auto regular = static_cast<uint64_t>(std::ranges::count_if(geometry_.triangles, [&](const Triangle& t) {
-      return valence_[t.x] == kRegularValence && valence_[t.y] == kRegularValence && valence_[t.z] == kRegularValence;
-    }));
-    if (regular < kMaxClusterTriangles / 2 || 4 * regular < count) return {};
-    list_triangles_of_vertices();
-    places_.resize(count);
-    visited_.assign(count, 0);
-    for (uint32_t seed = 0; seed < count; ++seed) {
-      if (visited_[seed] != 0 || !is_regular(seed)) continue;
-      grow(seed, corner_off_diagonals(seed), ~0u);
-      cut_blocks();
+    const auto regular = static_cast<uint64_t>(std::ranges::count_if(
+        geometry_.triangles, [&](const Triangle& t) { return is_inside_uniform(t) || plain_corner(t); }));
+    if (regular >= kMaxClusterTriangles / 2 && 4 * regular >= count)
+      find_blocks([&](uint32_t seed) { return begin_by_valence(seed); });
+    if (const size_t found = triangles_in_blocks(); 2 * found < count && find_longest_edges()) {
+      std::vector<RegularBlock> by_valence = std::exchange(blocks_, {});
+      find_blocks([&](uint32_t seed) { return begin_by_longest_edge(seed); });
+      if (triangles_in_blocks() <= found) blocks_ = std::move(by_valence);
     }
     return std::move(blocks_);
   }
 
 private:
+  /// Finds the blocks of all parts.
+  /// @param begin sets how the diagonals lie around a seed. Returns the corner that comes first, or nothing if the seed
+  /// is not in a grid.
+  template <class Begin>
+  void find_blocks(const Begin& begin) {
+    const size_t count = geometry_.triangles.size();
+    if (first_.empty()) list_triangles_of_vertices();
+    places_.resize(count);
+    visited_.assign(count, 0);
+    for (uint32_t seed = 0; seed < count; ++seed) {
+      if (visited_[seed] != 0) continue;
+      const std::optional<uint32_t> first = begin(seed);
+      if (!first) continue;
+      grow(seed, *first, ~0u);
+      cut_blocks();
+    }
+  }
+
+  size_t triangles_in_blocks() const {
+    size_t count = 0;
+    for (const RegularBlock& block : blocks_) count += block.triangle_count;
+    return count;
+  }
+
   void list_triangles_of_vertices() {
     first_.assign(valence_.size() + 1, 0);
     for (size_t v = 0; v < valence_.size(); ++v) first_[v + 1] = first_[v] + valence_[v];
@@ -84,13 +134,114 @@ private:
       for (int corner = 0; corner < 3; ++corner) around_[next[geometry_.triangles[t][corner]]++] = t;
   }
 
-  bool is_regular(uint32_t triangle) const {
+  std::optional<uint32_t> begin_by_valence(uint32_t seed) {
+    const std::optional<uint32_t> plain = plain_corner(geometry_.triangles[seed]);
+    diagonals_ = plain ? Diagonals::kAlternating : Diagonals::kEqual;
+    if (plain) return (*plain + 2) % 3; // corner 1 of the seed is at the end of no diagonal
+    if (!is_uniform(seed)) return std::nullopt;
+    return corner_off_diagonals(seed);
+  }
+
+  std::optional<uint32_t> begin_by_longest_edge(uint32_t seed) {
+    diagonals_ = Diagonals::kLongestEdges;
+    if (!is_half_quad(seed)) return std::nullopt;
+    return (longest_[seed] + 1u) % 3; // the diagonal is edge 2
+  }
+
+  /// Finds the longest edge of each triangle. Returns false unless most triangles have about a right angle opposite to
+  /// it, as the halves of a rectangle have, and a quarter of them look like parts of a grid.
+  bool find_longest_edges() {
+    const size_t count = geometry_.triangles.size();
+    if (count < kMaxClusterTriangles) return false;
+    longest_.resize(count);
+    size_t right_angled = 0;
+    for (size_t t = 0; t < count; ++t) {
+      const Triangle& triangle = geometry_.triangles[t];
+      std::array<double, 3> squares{};
+      for (int e = 0; e < 3; ++e) squares[static_cast<size_t>(e)] = squared_length(triangle[e], triangle[(e + 1) % 3]);
+      const auto longest = std::ranges::max_element(squares);
+      longest_[t] = static_cast<uint8_t>(longest - squares.begin());
+      const double others = squares[0] + squares[1] + squares[2] - *longest;
+      right_angled += *longest > kMinRightAngle * others && *longest < kMaxRightAngle * others;
+    }
+    if (4 * right_angled < 3 * count) return false;
+    // Per vertex: twice its number of edges other than diagonals.
+    sides_.assign(valence_.size(), 0);
+    for (size_t v = 0; v < valence_.size(); ++v) sides_[v] = 2 * valence_[v];
+    for (uint32_t t = 0; t < count; ++t) --sides_[corner(t, longest_[t])], --sides_[corner(t, longest_[t] + 1u)];
+    const auto regular = static_cast<uint64_t>(std::ranges::count_if(geometry_.triangles, [&](const Triangle& t) {
+      return sides_[t.x] == kInnerSides && sides_[t.y] == kInnerSides && sides_[t.z] == kInnerSides;
+    }));
+    return 4 * regular >= count;
+  }
+
+  double squared_length(uint32_t from, uint32_t to) const {
+    const LatticePoint &a = place_of(from), &b = place_of(to);
+    double sum = 0.0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const auto d = static_cast<double>(b[axis] - a[axis]);
+      sum += d * d;
+    }
+    return sum;
+  }
+
+  /// Returns whether the triangle may be half of a quad in a grid whose diagonals are longest edges: it and the
+  /// triangle across its longest edge have the same, and four other edges meet at each of its corners that is not on a
+  /// border.
+  bool is_half_quad(uint32_t triangle) const {
+    for (uint32_t c = 0; c < 3; ++c) {
+      const uint32_t sides = sides_[corner(triangle, c)];
+      if (sides != kInnerSides && sides > kMaxBorderSides) return false;
+    }
+    const auto other = across(triangle, longest_[triangle]);
+    return other && longest_[other->first] == other->second;
+  }
+
+  bool is_inside_uniform(const Triangle& t) const {
+    return valence_[t.x] == kRegularValence && valence_[t.y] == kRegularValence && valence_[t.z] == kRegularValence;
+  }
+
+  /// Returns the corner at the end of no diagonal, if the triangle is one inside a grid with alternating diagonals.
+  std::optional<uint32_t> plain_corner(const Triangle& t) const {
+    for (uint32_t c = 0; c < 3; ++c) {
+      const auto at = [&](uint32_t k) { return valence_[t[static_cast<int>((c + k) % 3)]]; };
+      if (at(0) == kPlainValence && at(1) == kDiagonalValence && at(2) == kDiagonalValence) return c;
+    }
+    return std::nullopt;
+  }
+
+  /// Returns whether the triangle may be one of a grid whose quads all have the same diagonal.
+  bool is_uniform(uint32_t triangle) const {
     for (int corner = 0; corner < 3; ++corner) {
       const uint32_t valence = valence_[geometry_.triangles[triangle][corner]];
       if (valence != kRegularValence && valence > kMaxBorderValence) return false;
     }
     return true;
   }
+
+  /// Returns whether the triangle has the longest edge, or the numbers of triangles at its corners, that its place
+  /// requires.
+  bool is_regular(uint32_t triangle, const Place& place) const {
+    if (diagonals_ == Diagonals::kEqual) return is_uniform(triangle);
+    if (diagonals_ == Diagonals::kLongestEdges)
+      return (place.first + place.shape().find(QuadEdge::kDiagonal)) % 3 == longest_[triangle] &&
+             is_half_quad(triangle);
+    const QuadTriangle& shape = place.shape();
+    for (uint32_t c = 0; c < 3; ++c) {
+      const uint32_t valence = valence_[corner(triangle, place.first + c)];
+      const bool diagonals_end = (place.i + place.j + shape.corners[c][0] + shape.corners[c][1]) % 2 == 0;
+      if (diagonals_end ? valence != kDiagonalValence && valence > kMaxDiagonalBorderValence
+                        : valence != kPlainValence && valence > kMaxPlainBorderValence)
+        return false;
+    }
+    return true;
+  }
+
+  /// Returns the diagonal of a quad, unless diagonals are longest edges.
+  uint8_t diagonal(int32_t i, int32_t j) const {
+    return diagonals_ == Diagonals::kAlternating ? static_cast<uint8_t>(static_cast<uint32_t>(i + j) & 1u) : uint8_t{0};
+  }
+  bool has(uint32_t triangle, QuadEdge edge) const { return places_[triangle].shape().find(edge) < 3; }
 
   uint32_t corner(uint32_t triangle, uint32_t number) const {
     return geometry_.triangles[triangle][static_cast<int>(number % 3)];
@@ -116,27 +267,35 @@ private:
     return found;
   }
 
-  /// Returns the triangle across a side, and its place in the grid. Returns nothing if that triangle is not regular or
+  /// Returns the triangle across an edge, and its place in the grid. Returns nothing if that triangle is not regular or
   /// was visited before.
-  std::optional<Neighbour> enter(uint32_t triangle, uint32_t side) const {
+  std::optional<Neighbour> enter(uint32_t triangle, QuadEdge edge) const {
     const Place& from = places_[triangle];
-    const auto found = across(triangle, from.first + side);
-    if (!found || visited_[found->first] != 0 || !is_regular(found->first)) return std::nullopt;
-    Place to{from.i, from.j, !from.upper, 0};
-    uint32_t turn = 0; // in the other triangle, from the first corner of the shared edge to the corner at (i, j)
-    if (!from.upper && side == kBelow) --to.j, turn = 2;
-    if (!from.upper && side == kRight) ++to.i, turn = 1;
-    if (from.upper && side == kDiagonalOfUpper) turn = 1;
-    if (from.upper && side == kAbove) ++to.j;
-    if (from.upper && side == kLeft) --to.i, turn = 2;
-    to.first = static_cast<uint8_t>((found->second + turn) % 3);
+    const auto found = across(triangle, from.first + from.shape().find(edge));
+    if (!found || visited_[found->first] != 0) return std::nullopt;
+    Place to{from.i, from.j, edge == QuadEdge::kDiagonal && !from.upper, from.diagonal, 0};
+    if (edge == QuadEdge::kRight) ++to.i;
+    if (edge == QuadEdge::kLeft) --to.i;
+    if (edge == QuadEdge::kAbove) ++to.j;
+    if (edge == QuadEdge::kBelow) --to.j;
     if (std::max(std::abs(to.i), std::abs(to.j)) > kMaxCoordinate) return std::nullopt;
+    const auto place_with = [&](uint8_t diagonal) {
+      if (edge != QuadEdge::kDiagonal) {
+        to.diagonal = diagonal;
+        to.upper = false;
+        to.upper = to.shape().find(opposite(edge)) == 3; // else the lower one has it
+      }
+      to.first = static_cast<uint8_t>((found->second + 3 - to.shape().find(opposite(edge))) % 3);
+      return is_regular(found->first, to);
+    };
+    if (!place_with(diagonal(to.i, to.j)) && (diagonals_ != Diagonals::kLongestEdges || !place_with(1)))
+      return std::nullopt;
     return Neighbour{found->first, to};
   }
 
-  /// Visits the triangle across a side and returns it; kNothing if there is none to visit.
-  uint32_t step(uint32_t triangle, uint32_t side) {
-    const std::optional<Neighbour> next = enter(triangle, side);
+  /// Visits the triangle across an edge and returns it; kNothing if there is none to visit.
+  uint32_t step(uint32_t triangle, QuadEdge edge) {
+    const std::optional<Neighbour> next = enter(triangle, edge);
     if (!next) return kNothing;
     visit(next->triangle, next->place);
     return next->triangle;
@@ -154,22 +313,21 @@ private:
   /// @param limit stops after a row if at least so many triangles were visited
   void grow(uint32_t seed, uint32_t first, uint32_t limit) {
     part_.clear();
-    visit(seed, {0, 0, false, static_cast<uint8_t>(first)});
+    visit(seed, {0, 0, false, 0, static_cast<uint8_t>(first)});
     visit_row(seed);
     for (size_t k = 0; k < part_.size() && part_.size() < limit; ++k) {
-      const uint32_t next = step(part_[k], places_[part_[k]].upper ? kAbove : kBelow);
+      const uint32_t next = step(part_[k], places_[part_[k]].upper ? QuadEdge::kAbove : QuadEdge::kBelow);
       if (next != kNothing) visit_row(next);
     }
   }
 
   void visit_row(uint32_t start) {
-    const uint32_t other = step(start, places_[start].upper ? kDiagonalOfUpper : kDiagonalOfLower);
-    const auto walk = [&](uint32_t triangle, uint32_t of_lower, uint32_t of_upper) {
-      while (triangle != kNothing) triangle = step(triangle, places_[triangle].upper ? of_upper : of_lower);
-    };
-    const bool upper = places_[start].upper;
-    walk(upper ? other : start, kRight, kDiagonalOfUpper);
-    walk(upper ? start : other, kDiagonalOfLower, kLeft);
+    const uint32_t other = step(start, QuadEdge::kDiagonal);
+    for (const QuadEdge direction : {QuadEdge::kRight, QuadEdge::kLeft}) {
+      uint32_t triangle = has(start, direction) ? start : other;
+      while (triangle != kNothing)
+        triangle = step(triangle, has(triangle, direction) ? direction : QuadEdge::kDiagonal);
+    }
   }
 
   const LatticePoint& place_of(uint32_t vertex) const {
@@ -184,12 +342,11 @@ private:
       if (places_[t].upper) continue;
       ++count;
       for (uint32_t e = 0; e < 3; ++e) {
-        const LatticePoint &a = place_of(corner(t, places_[t].first + e)),
-                           &b = place_of(corner(t, places_[t].first + e + 1));
-        for (size_t axis = 0; axis < 3; ++axis) {
-          const auto d = static_cast<double>(b[axis] - a[axis]);
-          sums[e] += d * d;
-        }
+        const QuadEdge edge = places_[t].shape().edges[e];
+        sums[edge == QuadEdge::kDiagonal ? 2
+             : edge == QuadEdge::kBelow  ? 0
+                                         : 1] +=
+            squared_length(corner(t, places_[t].first + e), corner(t, places_[t].first + e + 1));
       }
     }
     for (double& sum : sums) sum /= std::max(count, 1.0);
@@ -212,11 +369,15 @@ private:
     std::optional<Size> best;
     double least = 0.0;
     for (int32_t columns = 2; columns <= kMaxBlockColumns; ++columns) {
-      const Size size{columns, kBlockQuads / columns};
+      Size size{columns, kBlockQuads / columns};
+      if (diagonals_ == Diagonals::kAlternating && columns % 2 != 0)
+        continue; // an even size, so that all blocks are equal
+      if (diagonals_ == Diagonals::kAlternating) size.rows -= size.rows % 2;
       const double width = columns * std::sqrt(squares[0]), height = size.rows * std::sqrt(squares[1]);
       if (width > kMaxElongation * height || height > kMaxElongation * width) continue;
       uint32_t blocks = 0;
-      for_each_full_block({0, 0}, size, [&](int32_t, int32_t) { ++blocks; });
+      for_each_full_block({static_cast<int32_t>(diagonal(lowest_[0], lowest_[1])), 0}, size,
+                          [&](int32_t, int32_t) { ++blocks; });
       const double rest = static_cast<double>(part_.size()) - 2.0 * size.quads() * blocks;
       const bool odd = !std::has_single_bit(static_cast<uint32_t>(columns));
       const double cost = (kRestCost * rest + blocks * (kBlockCost + size.points())) * (odd ? kOddCost : 1.0);
@@ -234,6 +395,7 @@ private:
       lo.i = std::min(lo.i, places_[t].i), lo.j = std::min(lo.j, places_[t].j);
       hi.i = std::max(hi.i, places_[t].i), hi.j = std::max(hi.j, places_[t].j);
     }
+    lowest_ = {lo.i, lo.j};
     area_ = {hi.i - lo.i + 1, hi.j - lo.j + 1};
     const uint64_t cells = static_cast<uint64_t>(area_.columns) * static_cast<uint64_t>(area_.rows);
     if (cells > 16 * part_.size()) return;
@@ -251,6 +413,7 @@ private:
     size_t most = 0;
     for (int32_t y = 0; y < size.rows; ++y)
       for (int32_t x = 0; x < size.columns; ++x) {
+        if (diagonal(lowest_[0] + x, lowest_[1] + y) != 0) continue; // a block begins with diagonal 0
         size_t count = 0;
         for_each_full_block({x, y}, size, [&](int32_t, int32_t) { ++count; });
         if (count > most) most = count, best = {x, y};
@@ -294,46 +457,38 @@ private:
       }
   }
 
-  /// Adds the block whose lowest cell is (x, y). Its strips are kStripQuads long and lie side by side, so that 2 x 2
-  /// quads can form a leaf of a tree. Leaves of longer strips are narrow, and have large boxes where the grid is not
-  /// aligned to the axes.
+  /// Adds the block whose lowest cell is (x, y).
   void add_block(int32_t x, int32_t y, Size size) {
     if (!has_grid_vertices(x, y, size)) return;
     RegularBlock& block = blocks_.emplace_back();
-    const auto add = [&](uint32_t t) {
+    GridBlock shape{static_cast<uint32_t>(size.columns), static_cast<uint32_t>(size.rows), 0};
+    for (int32_t j = 0; j < size.rows; ++j)
+      for (int32_t i = 0; i < size.columns; ++i)
+        shape.diagonals |= uint64_t{places_[quads_[cell_of(x + i, y + j)][0]].diagonal} << (j * size.columns + i);
+    for (const GridTriangle& one : strip_order(shape)) {
+      const uint32_t t =
+          quads_[cell_of(x + static_cast<int32_t>(one.x), y + static_cast<int32_t>(one.y))][one.upper ? 1 : 0];
       block.triangles[block.triangle_count] = t;
       block.first_corner[block.triangle_count++] = places_[t].first;
-    };
-    // Transposing the grid exchanges lower and upper triangles.
-    const bool along_columns = size.columns < size.rows;
-    const int32_t length = along_columns ? size.rows : size.columns, strips = size.quads() / length;
-    for (int32_t end = length; end > 0; end -= kStripQuads)
-      for (int32_t strip = 0; strip < strips; ++strip)
-        for (int32_t i = end - 1; i >= std::max(0, end - kStripQuads); --i) {
-          const auto& quad = quads_[along_columns ? cell_of(x + strip, y + i) : cell_of(x + i, y + strip)];
-          add(quad[along_columns ? 1 : 0]);
-          add(quad[along_columns ? 0 : 1]);
-        }
+    }
   }
 
   /// Returns whether all triangles of the block that meet at a grid point share one vertex there.
   bool has_grid_vertices(int32_t x, int32_t y, Size size) const {
     std::array<uint32_t, size_t{3} * (kMaxBlockColumns + 1)> vertices; // a block of 2 x 32 quads has the most points
     vertices.fill(kNothing);
-    const auto put = [&](int32_t column, int32_t row, uint32_t vertex) {
-      uint32_t& known = vertices[static_cast<size_t>(row * (size.columns + 1) + column)];
-      if (known == kNothing) known = vertex;
-      return known == vertex;
-    };
     for (int32_t j = 0; j < size.rows; ++j)
-      for (int32_t i = 0; i < size.columns; ++i) {
-        const auto [lower, upper] = quads_[cell_of(x + i, y + j)];
-        const uint32_t a = places_[lower].first, b = places_[upper].first;
-        if (!put(i, j, corner(lower, a)) || !put(i + 1, j, corner(lower, a + 1)) ||
-            !put(i + 1, j + 1, corner(lower, a + 2)) || !put(i, j, corner(upper, b)) ||
-            !put(i + 1, j + 1, corner(upper, b + 1)) || !put(i, j + 1, corner(upper, b + 2)))
-          return false;
-      }
+      for (int32_t i = 0; i < size.columns; ++i)
+        for (const uint32_t t : quads_[cell_of(x + i, y + j)]) {
+          const QuadTriangle& shape = places_[t].shape();
+          for (uint32_t c = 0; c < 3; ++c) {
+            const int32_t column = i + shape.corners[c][0], row = j + shape.corners[c][1];
+            uint32_t& known = vertices[static_cast<size_t>(row * (size.columns + 1) + column)];
+            const uint32_t vertex = corner(t, places_[t].first + c);
+            if (known != kNothing && known != vertex) return false;
+            known = vertex;
+          }
+        }
     return true;
   }
 
@@ -342,7 +497,12 @@ private:
   std::vector<uint32_t> first_, around_; ///< triangles of vertex v: around_[first_[v]..first_[v+1])
   std::vector<Place> places_;            ///< per triangle, valid if visited
   std::vector<uint8_t> visited_;
-  std::vector<uint32_t> part_; ///< triangles of the connected part being cut
+  std::vector<uint32_t>
+      sides_; ///< per vertex: twice its number of edges other than diagonals, if these are longest edges
+  std::vector<uint8_t> longest_; ///< per triangle: number of its longest edge; empty unless diagonals are longest edges
+  std::vector<uint32_t> part_;   ///< triangles of the connected part being cut
+  Diagonals diagonals_ = Diagonals::kEqual; ///< whether the diagonals of its quads alternate
+  std::array<int32_t, 2> lowest_{};         ///< least column and row of the part
   Size area_{};
   std::vector<std::array<uint32_t, 2>> quads_; ///< per cell: lower and upper triangle
   std::vector<uint32_t> full_;

@@ -9,8 +9,8 @@
 
 namespace packtrace {
 
-/// A cluster-sized rectangle of a regular grid of quads, each cut along the same diagonal. All blocks of one size have
-/// equal strips, which a compressed page stores once.
+/// A cluster-sized rectangle of a regular grid of quads (a GridBlock). If the diagonals of all quads are equal or
+/// alternate, all blocks of one size have equal strips, which a compressed page stores once.
 struct RegularBlock {
   uint32_t triangle_count = 0;
   std::array<uint32_t, kMaxClusterTriangles> triangles;   ///< indices into QuantizedGeometry::triangles, in strip order
@@ -24,8 +24,10 @@ struct RegularBlock {
   }
 };
 
-/// Finds disjoint blocks in the regular parts of a mesh, where six triangles meet at every vertex. Returns none if the
-/// regular parts have less than a quarter of the triangles. The blocks of a grid are in row order.
+/// Finds disjoint blocks in the regular parts of a mesh, where six triangles meet at every vertex, or alternately four
+/// and eight. If these hold less than half of the triangles, but three quarters are about right-angled, also looks for
+/// quads whose diagonals are the longest edges of their triangles, and returns what holds more. The blocks of a grid
+/// are in row order.
 std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry);
 
 } // namespace packtrace
