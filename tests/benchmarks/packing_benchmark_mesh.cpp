@@ -10,6 +10,7 @@
 #include "assets/generator/displaced_mesh.h"
 #include "pbrt_import/import_scene.h"
 #include "tests/benchmarks/benchmark_options.h"
+#include "tests/benchmarks/packing_benchmark_grids.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -82,6 +83,15 @@ PackingInput generated_packing_input(uint64_t triangles, const std::filesystem::
   return load_packing_input("generated", folder / "mesh.pbrt", false);
 }
 
+PackingInput grid_packing_input(const std::string& name) {
+  PackingInput input{name, {}, {}};
+  input.scene.meshes.push_back(make_grid_input(name));
+  input.scene.materials.emplace_back();
+  input.scene.shapes.emplace_back();
+  input.mesh = merge_world(input.scene);
+  return input;
+}
+
 } // namespace
 
 Mesh merge_world(const Scene& scene) {
@@ -113,6 +123,8 @@ Mesh weld_positions(const Mesh& mesh) {
 
 PackingInput find_packing_input(const std::string& name, const std::filesystem::path& scenes,
                                 uint64_t generated_triangles) {
+  if (const auto grids = grid_input_names(); std::ranges::find(grids, name) != grids.end())
+    return grid_packing_input(name);
   if (name != "generated") return load_packing_input(name, scenes / name / "scene.pbrt", name == "bunny");
   const TemporaryFolder folder;
   return generated_packing_input(generated_triangles, folder.path());
@@ -121,10 +133,16 @@ PackingInput find_packing_input(const std::string& name, const std::filesystem::
 void PackingInputs::add_to(BenchmarkOptions& command_line) {
   command_line.add("--scenes", scenes, "holds bunny, spaceship and house").environment("PACKTRACE_SCENES");
   command_line.add("--generated-triangles", generated_triangles, "of the generated mesh").show_default();
-  command_line.add("INPUT", names, "which; all if none is named").one_of({"bunny", "spaceship", "house", "generated"});
+  std::vector<std::string> known{"bunny", "spaceship", "house", "generated", "grids"};
+  known.insert(known.end(), grid_input_names().begin(), grid_input_names().end());
+  command_line.add("INPUT", names, "which; `grids` are all grid-...; if none is named, all but those").one_of(known);
 }
 
 void PackingInputs::choose() {
+  if (const auto grids = std::ranges::find(names, "grids"); grids != names.end()) {
+    const auto at = names.erase(grids);
+    names.insert(at, grid_input_names().begin(), grid_input_names().end());
+  }
   if (!names.empty()) return;
   names = {"generated"};
   if (!scenes.empty()) names.insert(names.begin(), {"bunny", "spaceship", "house"});

@@ -99,6 +99,7 @@ def measure(options):
     benchmark("growth", "trace_benchmark", "--growth", "--cpu-clock", "--repeats", 3)
     benchmark("packing", "packing_benchmark", "--seconds", 0.3, "--generated-triangles", 60000, "bunny", "house",
               "generated")
+    benchmark("grids", "packing_benchmark", "--seconds", 0, "grids")
     benchmark("import", "import_benchmark", "--repeats", 7)
     benchmark("lod_times", "lod_benchmark", "--times-only", "--generated-triangles", 60000, "bunny", "spaceship",
               "generated")
@@ -186,6 +187,15 @@ def packing_tables(results):
             cells.append(f"{codec['bytes_per_triangle']:.2f} ({codec[speed + '_mtri_per_s']:.1f})")
         rows.append([f"{name}: {'opening' if speed == 'open' else 'decoding'}", *cells])
     print_table(["codec", *(m["name"] for m in inputs)], rows)
+    print("Regular grids, the same: bytes per triangle.\n")
+    pairs = (("packtrace, codec fast", "meshoptimizer codecs, zstd 19"),
+             ("packtrace, codec small", "Draco, compression level 10"))
+    rows = []
+    for mesh in results("grids")["inputs"]:
+        size = {c["codec"]: c["bytes_per_triangle"] for c in mesh["positions"] if c["precision"] == "edge/128"}
+        rows.append([mesh["name"], *(f"{size[ours]:.2f} / {size[theirs]:.2f} = {size[ours] / size[theirs]:.2f}"
+                                     for ours, theirs in pairs)])
+    print_table(["mesh", "fast / meshoptimizer", "small / Draco"], rows)
 
 
 def time_tables(results):
