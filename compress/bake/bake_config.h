@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "compress/bake/clusters/grid_blocks.h"
 #include "compress/bake/level_chain.h"
 #include "compress/bake/proxies/proxy_config.h"
 #include "compress/format/cluster/normal_codec.h"
@@ -95,11 +96,16 @@ struct BakeConfig {
 
   /// Compression of pages on disk. Decoded data do not depend on it.
   PageCodec codec = PageCodec::kNone;
-  /// Whether to cut regular grids into equal blocks (regular_blocks.h). Codecs fast and small store the topology of
-  /// equal blocks once, which halves the files of grids. It changes clusters and trees, but not the surface.
-  bool equal_blocks = false;
-  /// Sets the codec, and equal_blocks for every codec but kNone.
-  void choose_codec(PageCodec chosen) { codec = chosen, equal_blocks = chosen != PageCodec::kNone; }
+  /// Which regular grids are cut into blocks of quads. Codec fast has a form for blocks, and codec small stores the
+  /// topology of equal ones once. It changes clusters and trees, but not the surface.
+  GridBlocks grid_blocks = GridBlocks::kNone;
+  /// Sets the codec, and grid_blocks to what suits it.
+  void choose_codec(PageCodec chosen) {
+    codec = chosen;
+    grid_blocks = chosen == PageCodec::kFast    ? GridBlocks::kPartly
+                  : chosen == PageCodec::kSmall ? GridBlocks::kMostly
+                                                : GridBlocks::kNone;
+  }
 
   bool trees = true; ///< store trees over the clusters; otherwise they are built before tracing
 

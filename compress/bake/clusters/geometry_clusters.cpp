@@ -101,11 +101,11 @@ std::vector<Chunk> split_into_chunks(std::span<const PlacedTriangle> keys) {
 
 } // namespace
 
-GeometryClusters split_geometry(const QuantizedGeometry& geometry, bool equal_blocks) {
+GeometryClusters split_geometry(const QuantizedGeometry& geometry, GridBlocks grid_blocks) {
   const std::vector<uint32_t> rank = rank_kinds(geometry.kinds);
   const auto rank_of = [&](uint32_t triangle) { return rank[geometry.kind_of[triangle]]; };
   std::vector<RegularBlock> blocks;
-  if (equal_blocks) blocks = find_regular_blocks(geometry);
+  if (grid_blocks != GridBlocks::kNone) blocks = find_regular_blocks(geometry, grid_blocks);
   std::ranges::stable_sort(blocks, {}, [&](const RegularBlock& block) { return rank_of(block.triangles[0]); });
   std::vector<PlacedTriangle> keys = sort_triangles(geometry, rank);
   if (!blocks.empty()) {

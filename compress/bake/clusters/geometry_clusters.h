@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compress/bake/clusters/grid_blocks.h"
 #include "compress/bake/clusters/quantized_geometry.h"
 
 namespace packtrace {
@@ -22,7 +23,6 @@ struct GeometryClusters {
 
 /// Splits a geometry into clusters of at most 128 triangles and 256 vertices, ordered by material slot, kind and
 /// position. The result depends on the input only, not on the thread count.
-/// @param equal_blocks whether to cut regular grids into equal blocks (regular_blocks.h)
-GeometryClusters split_geometry(const QuantizedGeometry& geometry, bool equal_blocks);
+GeometryClusters split_geometry(const QuantizedGeometry& geometry, GridBlocks grid_blocks);
 
 } // namespace packtrace

@@ -20,13 +20,14 @@ constexpr uint32_t kRegularValence = 6;
 constexpr uint32_t kDiagonalValence = 8, kPlainValence = 4;
 /// Maximum number of triangles at a vertex on the border of a grid.
 constexpr uint32_t kMaxBorderValence = 3, kMaxDiagonalBorderValence = 4, kMaxPlainBorderValence = 2;
-constexpr int32_t kBlockQuads = kMaxClusterTriangles / 2;
 constexpr uint32_t kProbe = 512; ///< number of triangles from which the diagonals of a grid are chosen
+constexpr int32_t kBlockQuads = kMaxGridQuads;
 constexpr int32_t kMaxBlockColumns = 32;
 constexpr double kMaxElongation = 2.5; ///< maximum ratio of a block's sides, from mean edge lengths
 constexpr double kBlockCost = 8.0;     ///< cost of a block apart from its vertices; a vertex costs 1
-constexpr double kRestCost = 1.0;      ///< cost of a triangle outside all blocks
-constexpr size_t kFewBlocks = 4;       ///< minimum number of blocks, unless they fill the whole part
+/// Fewer blocks must fill the whole part, and this number three fifths of it.
+constexpr size_t kFewBlocks = 4;
+constexpr double kMinShareOfFew = 0.6;
 /// Factor of the cost where the number of columns is not a power of two. Powers of two divide symmetric shapes evenly,
 /// so that the positions of their blocks also repeat.
 constexpr double kOddCost = 1.05;
@@ -67,6 +68,14 @@ QuadEdge opposite(QuadEdge edge) {
   return QuadEdge::kDiagonal;
 }
 
+/// How parts are cut into blocks.
+struct CutRule {
+  double min_share;    ///< least share of a part's triangles in blocks
+  double rest_cost;    ///< cost of a triangle outside all blocks
+  int32_t small_quads; ///< quads of small blocks; 0: none are used
+};
+constexpr CutRule kCutMostly{0.6, 1.0, 0}, kCutPartly{0.3, 1.5, kBlockQuads / 2};
+
 struct Neighbour {
   uint32_t triangle;
   Place place;
@@ -81,8 +90,9 @@ struct Size {
 
 class BlockFinder {
 public:
-  explicit BlockFinder(const QuantizedGeometry& geometry)
-      : geometry_(geometry), valence_(geometry.vertices.size(), 0) {}
+  BlockFinder(const QuantizedGeometry& geometry, GridBlocks which)
+      : geometry_(geometry), cut_(which == GridBlocks::kPartly ? kCutPartly : kCutMostly),
+        valence_(geometry.vertices.size(), 0) {}
 
   std::vector<RegularBlock> run() {
     for (const Triangle& t : geometry_.triangles)
@@ -169,10 +179,17 @@ private:
     sides_.assign(valence_.size(), 0);
     for (size_t v = 0; v < valence_.size(); ++v) sides_[v] = 2 * valence_[v];
     for (uint32_t t = 0; t < count; ++t) --sides_[corner(t, longest_[t])], --sides_[corner(t, longest_[t] + 1u)];
-    const auto regular = static_cast<uint64_t>(std::ranges::count_if(geometry_.triangles, [&](const Triangle& t) {
-      return sides_[t.x] == kInnerSides && sides_[t.y] == kInnerSides && sides_[t.z] == kInnerSides;
-    }));
+    const auto regular = static_cast<uint64_t>(
+        std::ranges::count_if(geometry_.triangles, [&](const Triangle& t) { return has_grid_sides(t); }));
     return 4 * regular >= count;
+  }
+
+  /// Returns whether each corner has as many edges other than diagonals as a vertex inside or on the border of a grid.
+  bool has_grid_sides(const Triangle& t) const {
+    const auto fits = [&](uint32_t vertex) {
+      return sides_[vertex] == kInnerSides || sides_[vertex] <= kMaxBorderSides;
+    };
+    return fits(t.x) && fits(t.y) && fits(t.z);
   }
 
   double squared_length(uint32_t from, uint32_t to) const {
@@ -189,10 +206,7 @@ private:
   /// triangle across its longest edge have the same, and four other edges meet at each of its corners that is not on a
   /// border.
   bool is_half_quad(uint32_t triangle) const {
-    for (uint32_t c = 0; c < 3; ++c) {
-      const uint32_t sides = sides_[corner(triangle, c)];
-      if (sides != kInnerSides && sides > kMaxBorderSides) return false;
-    }
+    if (!has_grid_sides(geometry_.triangles[triangle])) return false;
     const auto other = across(triangle, longest_[triangle]);
     return other && longest_[other->first] == other->second;
   }
@@ -354,9 +368,10 @@ private:
   }
 
   /// Returns the corner of the seed that must come first to make diagonals of the longest of the three edge directions
-  /// around the seed.
-  uint32_t corner_off_diagonals(uint32_t seed) {
+  /// around the seed. Returns nothing if its part is too small for a block.
+  std::optional<uint32_t> corner_off_diagonals(uint32_t seed) {
     grow(seed, 0, kProbe);
+    if (part_.size() < kMaxClusterTriangles) return std::nullopt;
     const std::array<double, 3> squares = mean_squares();
     for (const uint32_t t : part_) visited_[t] = 0;
     const auto longest = static_cast<uint32_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
@@ -368,26 +383,29 @@ private:
     const std::array<double, 3> squares = mean_squares();
     std::optional<Size> best;
     double least = 0.0;
-    for (int32_t columns = 2; columns <= kMaxBlockColumns; ++columns) {
-      Size size{columns, kBlockQuads / columns};
-      if (diagonals_ == Diagonals::kAlternating && columns % 2 != 0)
-        continue; // an even size, so that all blocks are equal
+    const auto consider = [&](Size size) {
+      if (diagonals_ == Diagonals::kAlternating && size.columns % 2 != 0) return; // even sizes, so that all are equal
       if (diagonals_ == Diagonals::kAlternating) size.rows -= size.rows % 2;
-      const double width = columns * std::sqrt(squares[0]), height = size.rows * std::sqrt(squares[1]);
-      if (width > kMaxElongation * height || height > kMaxElongation * width) continue;
+      const double width = size.columns * std::sqrt(squares[0]), height = size.rows * std::sqrt(squares[1]);
+      if (size.rows < 2 || width > kMaxElongation * height || height > kMaxElongation * width) return;
       uint32_t blocks = 0;
       for_each_full_block({static_cast<int32_t>(diagonal(lowest_[0], lowest_[1])), 0}, size,
                           [&](int32_t, int32_t) { ++blocks; });
       const double rest = static_cast<double>(part_.size()) - 2.0 * size.quads() * blocks;
-      const bool odd = !std::has_single_bit(static_cast<uint32_t>(columns));
-      const double cost = (kRestCost * rest + blocks * (kBlockCost + size.points())) * (odd ? kOddCost : 1.0);
+      const bool odd = !std::has_single_bit(static_cast<uint32_t>(size.columns));
+      const double cost = (cut_.rest_cost * rest + blocks * (kBlockCost + size.points())) * (odd ? kOddCost : 1.0);
       if (!best || cost < least) best = size, least = cost;
+    };
+    for (int32_t columns = 2; columns <= kMaxBlockColumns; ++columns) consider({columns, kBlockQuads / columns});
+    // Small blocks save little in strips that are one of them wide.
+    for (int32_t columns = 2; columns <= cut_.small_quads / 2; ++columns) {
+      const Size size{columns, cut_.small_quads / columns};
+      if (area_.columns >= 2 * size.columns && area_.rows >= 2 * size.rows) consider(size);
     }
     return best;
   }
 
-  /// Cuts the part into blocks. Leaves it whole if blocks would hold less than three fifths of it, or if fewer than
-  /// kFewBlocks would not fill it.
+  /// Cuts the part into blocks, unless they would hold too little of it.
   void cut_blocks() {
     if (part_.size() < kMaxClusterTriangles) return;
     Place lo = places_[part_[0]], hi = lo;
@@ -418,9 +436,10 @@ private:
         for_each_full_block({x, y}, size, [&](int32_t, int32_t) { ++count; });
         if (count > most) most = count, best = {x, y};
       }
-    const size_t quads = most * static_cast<size_t>(size.quads());
     // The triangles between blocks make poor clusters, and a few blocks save too little to make up for it.
-    if (10 * quads < 3 * part_.size() || (most < kFewBlocks && 2 * quads < part_.size())) return;
+    const double share = 2.0 * static_cast<double>(most) * size.quads() / static_cast<double>(part_.size());
+    const double min_share = most > kFewBlocks ? cut_.min_share : most == kFewBlocks ? kMinShareOfFew : 1.0;
+    if (share < min_share) return;
     for_each_full_block(best, size, [&](int32_t x, int32_t y) { add_block(x, y, size); });
   }
 
@@ -493,6 +512,7 @@ private:
   }
 
   const QuantizedGeometry& geometry_;
+  CutRule cut_;
   std::vector<uint32_t> valence_;        ///< per vertex: number of triangles
   std::vector<uint32_t> first_, around_; ///< triangles of vertex v: around_[first_[v]..first_[v+1])
   std::vector<Place> places_;            ///< per triangle, valid if visited
@@ -511,6 +531,8 @@ private:
 
 } // namespace
 
-std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry) { return BlockFinder(geometry).run(); }
+std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry, GridBlocks which) {
+  return BlockFinder(geometry, which).run();
+}
 
 } // namespace packtrace

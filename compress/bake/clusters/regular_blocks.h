@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compress/bake/clusters/grid_blocks.h"
 #include "compress/bake/clusters/quantized_geometry.h"
 #include "compress/format/cluster/index_codec.h"
 
@@ -28,6 +29,7 @@ struct RegularBlock {
 /// and eight. If these hold less than half of the triangles, but three quarters are about right-angled, also looks for
 /// quads whose diagonals are the longest edges of their triangles, and returns what holds more. The blocks of a grid
 /// are in row order.
-std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry);
+/// @param which kMostly or kPartly
+std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry, GridBlocks which);
 
 } // namespace packtrace

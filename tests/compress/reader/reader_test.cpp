@@ -32,7 +32,7 @@ protected:
   }
 
   void write(const Scene& scene, BakeConfig config = {}) {
-    config.equal_blocks = true; // for every codec, so that all files hold the same clusters
+    config.grid_blocks = GridBlocks::kPartly; // for every codec, so that all files hold the same clusters
     for (const PageCodec codec : {PageCodec::kFast, PageCodec::kSmall}) {
       config.codec = codec;
       disk_[codec] = test::bake(scene, config).bytes;
