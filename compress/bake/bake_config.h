@@ -97,9 +97,9 @@ struct BakeConfig {
   /// Compression of pages on disk. Decoded data do not depend on it.
   PageCodec codec = PageCodec::kNone;
   /// Which regular grids are cut into blocks of quads. Codec fast has a form for blocks, and codec small stores the
-  /// topology of equal ones once. It changes clusters and trees, but not the surface.
+  /// topology of equal blocks once. Blocks change clusters and trees, but not the surface.
   GridBlocks grid_blocks = GridBlocks::kNone;
-  /// Sets the codec, and grid_blocks to what suits it.
+  /// Sets the codec and the grid_blocks that give it the smallest files.
   void choose_codec(PageCodec chosen) {
     codec = chosen;
     grid_blocks = chosen == PageCodec::kFast    ? GridBlocks::kPartly

@@ -125,7 +125,7 @@ TEST(FastPage, HeadersOutOfRangeAreRefused) {
   EXPECT_FALSE(decodes([](Header& h) { h.escapes[0] = 1; }));
   EXPECT_FALSE(decodes([](Header& h) { h.flags = baked::kClusterHasNormals; }));
   EXPECT_FALSE(decodes([](Header& h) { h.flags = baked::kClusterHasUvs; }));
-  EXPECT_FALSE(decodes([](Header& h) { h.grid = 1; })); // parts would not be used
+  EXPECT_FALSE(decodes([](Header& h) { h.grid = 1; })); // the parts for strips would not be used
 }
 
 /// Two squares side by side as grids, encoded by hand. The second shares its left column.
@@ -140,7 +140,7 @@ struct Squares {
       header.triangles = 1, header.vertices = 3, header.grid = 1;
       header.position_bits = {4, 3, 0};
     }
-    headers[1].anchor = {20, 0, 0}; // 10
+    headers[1].anchor = {20, 0, 0}; // x = 10
     headers[1].neighbour = {1, 0}, headers[1].shared = {1, 0};
     parts[kFields] = {0x00};
     // By point (1, 0), (0, 1), (1, 1): x +10, 0, 0, y 0, +6, 0. Then (1, 0), (1, 1): x +9, +1, y 0, -1.
@@ -191,7 +191,7 @@ TEST(FastPage, GridsOutOfRangeAreRefused) {
   EXPECT_FALSE(decodes([](Header& h) { h.grid = 0; }));
   EXPECT_FALSE(decodes([](Header& h) { h.grid = 2; }));
   EXPECT_FALSE(decodes([](Header& h) { h.grid = kGridDiagonals; }));
-  EXPECT_FALSE(decodes([](Header& h) { h.grid = 1 | kGridDiagonals; })); // which are not there
+  EXPECT_FALSE(decodes([](Header& h) { h.grid = 1 | kGridDiagonals; })); // but no diagonals are stored
   EXPECT_FALSE(decodes([](Header& h) { h.strips = 1; }));
   EXPECT_FALSE(decodes([](Header& h) { h.creases = 1; }));
   EXPECT_FALSE(decodes([](Header& h) { h.neighbour[kLeftColumn] = 0; }));

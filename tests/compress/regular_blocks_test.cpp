@@ -72,14 +72,9 @@ Strips strips_of(const QuantizedGeometry& geometry, const RegularBlock& block) {
   return strips_in_order(triangles, static_cast<uint32_t>(numbers.size()));
 }
 
-TEST(RegularBlocks, AllBlocksOfAGridHaveTheSameStrips) {
-  test::Random random(1);
-  const QuantizedGeometry geometry = grid(80, 48, [&](uint32_t i, uint32_t j) {
-    return LatticePoint{100 * int64_t{i} + random.bits() % 30, 100 * int64_t{j} + random.bits() % 30,
-                        random.bits() % 80};
-  });
-  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, GridBlocks::kMostly);
-  EXPECT_EQ(count_triangles(geometry, blocks), geometry.triangles.size());
+/// Checks that all blocks have 8 x 8 quads and the same strips.
+void expect_equal_strips(const QuantizedGeometry& geometry, const std::vector<RegularBlock>& blocks) {
+  ASSERT_FALSE(blocks.empty());
   const Strips first = strips_of(geometry, blocks[0]);
   EXPECT_EQ(first.layout.strip_count, 32u);
   EXPECT_EQ(first.layout.vertex_count, 81u);
@@ -89,6 +84,17 @@ TEST(RegularBlocks, AllBlocksOfAGridHaveTheSameStrips) {
     EXPECT_EQ(strips.left, first.left);
     EXPECT_EQ(strips.restart, first.restart);
   }
+}
+
+TEST(RegularBlocks, AllBlocksOfAGridHaveTheSameStrips) {
+  test::Random random(1);
+  const QuantizedGeometry geometry = grid(80, 48, [&](uint32_t i, uint32_t j) {
+    return LatticePoint{100 * int64_t{i} + random.bits() % 30, 100 * int64_t{j} + random.bits() % 30,
+                        random.bits() % 80};
+  });
+  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, GridBlocks::kMostly);
+  EXPECT_EQ(count_triangles(geometry, blocks), geometry.triangles.size());
+  expect_equal_strips(geometry, blocks);
 }
 
 /// Cuts quad q of a grid with `columns` columns along the other diagonal.
@@ -108,14 +114,7 @@ TEST(RegularBlocks, DiagonalsMayAlternate) {
     }();
     const std::vector<RegularBlock> blocks = find_regular_blocks(all, GridBlocks::kMostly);
     EXPECT_GE(count_triangles(all, blocks), odd == 1 ? all.triangles.size() : all.triangles.size() * 4 / 5);
-    const Strips expected = strips_of(all, blocks[0]);
-    EXPECT_EQ(expected.layout.vertex_count, 81u);
-    EXPECT_EQ(expected.layout.strip_count, 32u);
-    for (const RegularBlock& block : blocks) {
-      const Strips strips = strips_of(all, block);
-      EXPECT_EQ(strips.corners, expected.corners);
-      EXPECT_EQ(strips.left, expected.left);
-    }
+    expect_equal_strips(all, blocks);
     // A hole and its irregular surroundings do not spoil the rest.
     QuantizedGeometry open = all;
     open.triangles.erase(open.triangles.begin() + 2 * (20 * 80 + 30), open.triangles.begin() + 2 * (20 * 80 + 37));
@@ -199,7 +198,7 @@ TEST(RegularBlocks, KindsAndSplitVerticesEndBlocks) {
 
 TEST(RegularBlocks, PartsWithManyDefectsHaveFewerBlocks) {
   QuantizedGeometry geometry = grid(120, 120, flat);
-  for (uint32_t j = 5; j < 120; j += 12) // holes between which full blocks of 8 x 8 quads are rare, those of 32 are not
+  for (uint32_t j = 5; j < 120; j += 12) // so many holes that blocks of 64 quads hold less than three fifths
     for (uint32_t i = 5; i < 120; i += 12) geometry.triangles[2 * (j * 120 + i)] = {0, 0, 0};
   std::erase_if(geometry.triangles, [](const Triangle& t) { return t.x == t.y; });
   geometry.kind_of.resize(geometry.triangles.size());

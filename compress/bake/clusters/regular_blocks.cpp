@@ -15,8 +15,8 @@ namespace {
 constexpr uint32_t kNothing = ~0u;
 /// Number of triangles at a vertex inside a grid whose quads all have the same diagonal.
 constexpr uint32_t kRegularValence = 6;
-/// Numbers of triangles at vertices inside a grid with alternating diagonals: at points where diagonals end, and at
-/// those between them.
+/// Numbers of triangles at the vertices inside a grid with alternating diagonals: where four diagonals end, and where
+/// none does.
 constexpr uint32_t kDiagonalValence = 8, kPlainValence = 4;
 /// Maximum number of triangles at a vertex on the border of a grid.
 constexpr uint32_t kMaxBorderValence = 3, kMaxDiagonalBorderValence = 4, kMaxPlainBorderValence = 2;
@@ -25,16 +25,16 @@ constexpr int32_t kBlockQuads = kMaxGridQuads;
 constexpr int32_t kMaxBlockColumns = 32;
 constexpr double kMaxElongation = 2.5; ///< maximum ratio of a block's sides, from mean edge lengths
 constexpr double kBlockCost = 8.0;     ///< cost of a block apart from its vertices; a vertex costs 1
-/// Fewer blocks must fill the whole part, and this number three fifths of it.
+/// Fewer blocks than kFewBlocks must fill their part. Exactly kFewBlocks must hold kMinShareOfFew of its triangles.
 constexpr size_t kFewBlocks = 4;
 constexpr double kMinShareOfFew = 0.6;
 /// Factor of the cost where the number of columns is not a power of two. Powers of two divide symmetric shapes evenly,
 /// so that the positions of their blocks also repeat.
 constexpr double kOddCost = 1.05;
-/// Twice the number of edges other than diagonals at a vertex inside a grid, and its maximum on the border, where an
-/// edge of one triangle counts once.
+/// Twice the number of quad edges at a vertex inside a grid, and its maximum on the border. An edge of a single
+/// triangle counts half.
 constexpr uint32_t kInnerSides = 8, kMaxBorderSides = 4;
-/// Limits for the square of the longest edge divided by those of the other two. It is 1 in halves of a rectangle.
+/// Limits of c^2 / (a^2 + b^2), where c is the longest edge of a triangle. The ratio is 1 in half of a rectangle.
 constexpr double kMinRightAngle = 0.8, kMaxRightAngle = 1.25;
 constexpr int32_t kMaxCoordinate = 1 << 24;
 
@@ -51,7 +51,7 @@ struct Place {
 /// How the diagonals of a grid lie: all alike, alternating, or each on the longest edge of its two triangles.
 enum class Diagonals { kEqual, kAlternating, kLongestEdges };
 
-/// Returns the edge of the neighbouring quad, or other triangle, that coincides with an edge.
+/// Returns how the triangle on the other side of an edge names it.
 QuadEdge opposite(QuadEdge edge) {
   switch (edge) {
   case QuadEdge::kBelow:
@@ -70,9 +70,9 @@ QuadEdge opposite(QuadEdge edge) {
 
 /// How parts are cut into blocks.
 struct CutRule {
-  double min_share;    ///< least share of a part's triangles in blocks
+  double min_share;    ///< minimum share of a part's triangles in blocks
   double rest_cost;    ///< cost of a triangle outside all blocks
-  int32_t small_quads; ///< quads of small blocks; 0: none are used
+  int32_t small_quads; ///< number of quads of a small block; 0: no small blocks
 };
 constexpr CutRule kCutMostly{0.6, 1.0, 0}, kCutPartly{0.3, 1.5, kBlockQuads / 2};
 
@@ -112,8 +112,8 @@ public:
 
 private:
   /// Finds the blocks of all parts.
-  /// @param begin sets how the diagonals lie around a seed. Returns the corner that comes first, or nothing if the seed
-  /// is not in a grid.
+  /// @param begin called for each triangle that was not visited. Sets diagonals_, and returns the corner at grid point
+  /// (0, 0), or nothing if the triangle is not in a grid.
   template <class Begin>
   void find_blocks(const Begin& begin) {
     const size_t count = geometry_.triangles.size();
@@ -144,22 +144,24 @@ private:
       for (int corner = 0; corner < 3; ++corner) around_[next[geometry_.triangles[t][corner]]++] = t;
   }
 
+  /// Chooses diagonals by the numbers of triangles at vertices.
   std::optional<uint32_t> begin_by_valence(uint32_t seed) {
     const std::optional<uint32_t> plain = plain_corner(geometry_.triangles[seed]);
     diagonals_ = plain ? Diagonals::kAlternating : Diagonals::kEqual;
-    if (plain) return (*plain + 2) % 3; // corner 1 of the seed is at the end of no diagonal
+    if (plain) return (*plain + 2) % 3; // no diagonal ends at corner 1
     if (!is_uniform(seed)) return std::nullopt;
     return corner_off_diagonals(seed);
   }
 
+  /// Makes diagonals of the longest edges.
   std::optional<uint32_t> begin_by_longest_edge(uint32_t seed) {
     diagonals_ = Diagonals::kLongestEdges;
     if (!is_half_quad(seed)) return std::nullopt;
     return (longest_[seed] + 1u) % 3; // the diagonal is edge 2
   }
 
-  /// Finds the longest edge of each triangle. Returns false unless most triangles have about a right angle opposite to
-  /// it, as the halves of a rectangle have, and a quarter of them look like parts of a grid.
+  /// Finds the longest edge of each triangle. Returns whether three quarters of the triangles are about right-angled,
+  /// and a quarter satisfy has_grid_sides().
   bool find_longest_edges() {
     const size_t count = geometry_.triangles.size();
     if (count < kMaxClusterTriangles) return false;
@@ -175,7 +177,7 @@ private:
       right_angled += *longest > kMinRightAngle * others && *longest < kMaxRightAngle * others;
     }
     if (4 * right_angled < 3 * count) return false;
-    // Per vertex: twice its number of edges other than diagonals.
+    // Each triangle counts half of its two edges at a vertex; the longest edge is the diagonal and not counted.
     sides_.assign(valence_.size(), 0);
     for (size_t v = 0; v < valence_.size(); ++v) sides_[v] = 2 * valence_[v];
     for (uint32_t t = 0; t < count; ++t) --sides_[corner(t, longest_[t])], --sides_[corner(t, longest_[t] + 1u)];
@@ -184,7 +186,7 @@ private:
     return 4 * regular >= count;
   }
 
-  /// Returns whether each corner has as many edges other than diagonals as a vertex inside or on the border of a grid.
+  /// Returns whether as many quad edges meet at each corner as inside or on the border of a grid.
   bool has_grid_sides(const Triangle& t) const {
     const auto fits = [&](uint32_t vertex) {
       return sides_[vertex] == kInnerSides || sides_[vertex] <= kMaxBorderSides;
@@ -202,9 +204,8 @@ private:
     return sum;
   }
 
-  /// Returns whether the triangle may be half of a quad in a grid whose diagonals are longest edges: it and the
-  /// triangle across its longest edge have the same, and four other edges meet at each of its corners that is not on a
-  /// border.
+  /// Returns whether the triangle may be half of a quad in a grid whose diagonals are longest edges. Its longest edge
+  /// must also be that of the triangle across.
   bool is_half_quad(uint32_t triangle) const {
     if (!has_grid_sides(geometry_.triangles[triangle])) return false;
     const auto other = across(triangle, longest_[triangle]);
@@ -215,7 +216,7 @@ private:
     return valence_[t.x] == kRegularValence && valence_[t.y] == kRegularValence && valence_[t.z] == kRegularValence;
   }
 
-  /// Returns the corner at the end of no diagonal, if the triangle is one inside a grid with alternating diagonals.
+  /// Returns the corner where no diagonal ends, if the triangle is inside a grid with alternating diagonals.
   std::optional<uint32_t> plain_corner(const Triangle& t) const {
     for (uint32_t c = 0; c < 3; ++c) {
       const auto at = [&](uint32_t k) { return valence_[t[static_cast<int>((c + k) % 3)]]; };
@@ -224,7 +225,7 @@ private:
     return std::nullopt;
   }
 
-  /// Returns whether the triangle may be one of a grid whose quads all have the same diagonal.
+  /// Returns whether the triangle may be in a grid whose quads all have the same diagonal.
   bool is_uniform(uint32_t triangle) const {
     for (int corner = 0; corner < 3; ++corner) {
       const uint32_t valence = valence_[geometry_.triangles[triangle][corner]];
@@ -233,8 +234,8 @@ private:
     return true;
   }
 
-  /// Returns whether the triangle has the longest edge, or the numbers of triangles at its corners, that its place
-  /// requires.
+  /// Returns whether the triangle fits its place: its longest edge is the diagonal, or its corners have the numbers of
+  /// triangles that a grid with these diagonals has there.
   bool is_regular(uint32_t triangle, const Place& place) const {
     if (diagonals_ == Diagonals::kEqual) return is_uniform(triangle);
     if (diagonals_ == Diagonals::kLongestEdges)
@@ -251,7 +252,7 @@ private:
     return true;
   }
 
-  /// Returns the diagonal of a quad, unless diagonals are longest edges.
+  /// Returns the diagonal of quad (i, j); 0 if diagonals are longest edges, which do not follow from the place.
   uint8_t diagonal(int32_t i, int32_t j) const {
     return diagonals_ == Diagonals::kAlternating ? static_cast<uint8_t>(static_cast<uint32_t>(i + j) & 1u) : uint8_t{0};
   }
@@ -384,7 +385,8 @@ private:
     std::optional<Size> best;
     double least = 0.0;
     const auto consider = [&](Size size) {
-      if (diagonals_ == Diagonals::kAlternating && size.columns % 2 != 0) return; // even sizes, so that all are equal
+      if (diagonals_ == Diagonals::kAlternating && size.columns % 2 != 0)
+        return; // odd sizes would give blocks of two kinds
       if (diagonals_ == Diagonals::kAlternating) size.rows -= size.rows % 2;
       const double width = size.columns * std::sqrt(squares[0]), height = size.rows * std::sqrt(squares[1]);
       if (size.rows < 2 || width > kMaxElongation * height || height > kMaxElongation * width) return;
@@ -397,7 +399,7 @@ private:
       if (!best || cost < least) best = size, least = cost;
     };
     for (int32_t columns = 2; columns <= kMaxBlockColumns; ++columns) consider({columns, kBlockQuads / columns});
-    // Small blocks save little in strips that are one of them wide.
+    // Small blocks save little where the part is too narrow for two of them side by side.
     for (int32_t columns = 2; columns <= cut_.small_quads / 2; ++columns) {
       const Size size{columns, cut_.small_quads / columns};
       if (area_.columns >= 2 * size.columns && area_.rows >= 2 * size.rows) consider(size);
@@ -405,7 +407,7 @@ private:
     return best;
   }
 
-  /// Cuts the part into blocks, unless they would hold too little of it.
+  /// Cuts the part into blocks, unless they would hold too few of its triangles.
   void cut_blocks() {
     if (part_.size() < kMaxClusterTriangles) return;
     Place lo = places_[part_[0]], hi = lo;
@@ -521,7 +523,7 @@ private:
       sides_; ///< per vertex: twice its number of edges other than diagonals, if these are longest edges
   std::vector<uint8_t> longest_; ///< per triangle: number of its longest edge; empty unless diagonals are longest edges
   std::vector<uint32_t> part_;   ///< triangles of the connected part being cut
-  Diagonals diagonals_ = Diagonals::kEqual; ///< whether the diagonals of its quads alternate
+  Diagonals diagonals_ = Diagonals::kEqual; ///< of the part
   std::array<int32_t, 2> lowest_{};         ///< least column and row of the part
   Size area_{};
   std::vector<std::array<uint32_t, 2>> quads_; ///< per cell: lower and upper triangle

@@ -27,8 +27,8 @@ struct RegularBlock {
 
 /// Finds disjoint blocks in the regular parts of a mesh, where six triangles meet at every vertex, or alternately four
 /// and eight. If these hold less than half of the triangles, but three quarters are about right-angled, also looks for
-/// quads whose diagonals are the longest edges of their triangles, and returns what holds more. The blocks of a grid
-/// are in row order.
+/// quads whose diagonals are the longest edges of their triangles, and returns the blocks that hold more triangles. The
+/// blocks of a grid are in row order.
 /// @param which kMostly or kPartly
 std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry, GridBlocks which);
 

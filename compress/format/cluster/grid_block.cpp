@@ -6,8 +6,9 @@
 namespace packtrace {
 namespace {
 
-/// Returns the length of the strips that end at quad `end` of a block's rows or columns. A strip of one quad would
-/// continue into the one beside it, and so would any strip of a block that is one quad wide.
+/// Returns the length of the strips that begin at quad end - 1 of a row or column and run towards quad 0. Strips of one
+/// quad are avoided: strips_in_order() would join neighbouring ones. It would also join all strips of a block that is
+/// one quad wide.
 uint32_t strip_length(uint32_t end, uint32_t width) { return width == 1 || end <= 3 ? end : 2; }
 
 /// Calls use(x, y, first, last) for all quads in strip order; `first` and `last` say that a strip begins or ends there.
@@ -26,12 +27,13 @@ void for_each_quad(uint32_t columns, uint32_t rows, const Use& use) {
 /// Corners of a quad: (x, y), (x+1, y), (x+1, y+1), (x, y+1).
 enum QuadCorner : uint8_t { kA, kB, kC, kD };
 
-/// How strips pass through a quad with diagonal 0 and 1, from the edge at x+1 to the one at x, or from y+1 to y.
+/// How a strip passes through a quad, by the quad's diagonal. Strips along rows run from edge x+1 to edge x, strips
+/// along columns from edge y+1 to edge y.
 struct QuadPassage {
   std::array<std::array<uint8_t, 4>, 2> first_corners; ///< corner list of a quad that begins a strip
   std::array<std::array<uint8_t, 2>, 2> next_corners;  ///< corner list of a later quad
-  std::array<uint8_t, 2> turns_into_next;              ///< into the next quad: 1 for left
-  std::array<uint8_t, 2> turns_inside;                 ///< across the diagonal of a later quad: 1 for left
+  std::array<uint8_t, 2> turns_into_next;              ///< turn from this quad into the next one: 1 for left
+  std::array<uint8_t, 2> turns_inside; ///< turn across the diagonal, unless the strip begins here: 1 for left
 
   std::span<const uint8_t> corners(uint32_t diagonal, bool first) const {
     return first ? std::span<const uint8_t>(first_corners[diagonal]) : next_corners[diagonal];
@@ -42,7 +44,7 @@ constexpr QuadPassage kAlongColumns{{{{kD, kA, kC, kB}, {kC, kD, kB, kA}}}, {{{k
 
 const QuadPassage& passage_of(uint32_t columns, uint32_t rows) { return columns >= rows ? kAlongRows : kAlongColumns; }
 
-/// Distances of a quad's corners from its point (x, y), in points.
+/// Numbers of a quad's corners (GridBlock::point()), minus that of (x, y).
 std::array<uint32_t, 4> corner_offsets(const GridBlock& block) { return {0, 1, block.columns + 2, block.columns + 1}; }
 
 void set_bit(std::span<uint64_t> bits, uint32_t at, uint64_t value) { bits[at / 64] |= value << (at % 64); }
@@ -100,10 +102,10 @@ uint64_t diagonals_of(uint32_t columns, uint32_t rows, std::span<const uint8_t> 
   uint64_t diagonals = 0;
   uint32_t triangle = 0;
   for_each_quad(columns, rows, [&](uint32_t x, uint32_t y, bool first, bool last) {
-    uint64_t diagonal = 0;
+    uint64_t diagonal = 0; // if the block is a single quad, whose diagonals have the same strips
     if (!first)
       diagonal = left[triangle + 1] == passage.turns_inside[1];
-    else if (!last) // else it is the only quad, and both diagonals have the same strips
+    else if (!last)
       diagonal = left[triangle + 2] == passage.turns_into_next[1];
     diagonals |= diagonal << (y * columns + x);
     triangle += 2;

@@ -17,7 +17,7 @@ struct QuadTriangle {
   std::array<std::array<uint8_t, 2>, 3> corners; ///< x and y, relative to the quad's (x, y)
   std::array<QuadEdge, 3> edges;
 
-  /// Returns the number of an edge; 3 if the triangle does not have it.
+  /// Returns e with edges[e] == edge; 3 if the triangle does not have this edge.
   constexpr uint32_t find(QuadEdge edge) const {
     uint32_t e = 0;
     while (e < 3 && edges[e] != edge) ++e;
@@ -25,8 +25,8 @@ struct QuadTriangle {
   }
 };
 
-/// Triangles of a quad, by its diagonal (0: between (x, y) and (x+1, y+1), 1: between (x+1, y) and (x, y+1)). The first
-/// triangle has the edge below, the second the edge above.
+/// kQuadTriangles[diagonal]: the lower and the upper triangle of a quad. Diagonal 0 is between (x, y) and (x+1, y+1),
+/// diagonal 1 between (x+1, y) and (x, y+1).
 inline constexpr std::array<std::array<QuadTriangle, 2>, 2> kQuadTriangles{
     {{{{{{{0, 0}, {1, 0}, {1, 1}}}, {QuadEdge::kBelow, QuadEdge::kRight, QuadEdge::kDiagonal}},
        {{{{0, 0}, {1, 1}, {0, 1}}}, {QuadEdge::kDiagonal, QuadEdge::kAbove, QuadEdge::kLeft}}}},
@@ -61,22 +61,23 @@ struct GridTriangle {
 /// a block that is one quad wide is a single strip.
 std::vector<GridTriangle> strip_order(const GridBlock& block);
 
-/// Strips of a GridBlock: those that strips_in_order() makes of its triangles in strip order. Bit arrays end with a
-/// word that is always 0, so that read_bits() may read them.
+/// The strips that strips_in_order() makes of the triangles of a GridBlock in strip order. Bit arrays end with a zero
+/// word, because read_bits() reads beyond the last bit.
 struct GridStrips {
   IndexLayout layout;
   std::array<uint64_t, kMaxClusterTriangles / 64 + 1> restart{}, left{}; ///< bits per triangle
   std::array<uint64_t, kMaxClusterTriangles / 32 + 1> fresh{};           ///< bits per corner
   std::array<uint8_t, 2 * kMaxClusterTriangles> corners;                 ///< the corner list
   std::array<uint8_t, 2 * kMaxClusterTriangles + 8> explicits{};         ///< vertices of the corners that are not fresh
-  std::array<uint8_t, kMaxClusterVertices> vertex_of_point;              ///< by GridBlock::point()
+  std::array<uint8_t, kMaxClusterVertices> vertex_of_point;              ///< vertex numbers by GridBlock::point()
 };
 
 /// Computes the strips of a block with at least one quad.
 void find_grid_strips(const GridBlock& block, GridStrips& strips);
 
-/// Returns the diagonals of the block of this size that has the given turns; others if no block has them.
-/// @param left per triangle in strip order
+/// Returns the diagonals of the block of this size that has the given turns. If there is no such block, the result is
+/// unspecified.
+/// @param left per triangle in strip order: 1 if it follows a left turn
 uint64_t diagonals_of(uint32_t columns, uint32_t rows, std::span<const uint8_t> left);
 
 } // namespace packtrace

@@ -101,7 +101,7 @@ private:
     return sections_.payload.subspan(static_cast<size_t>(range.payload_offset), range.payload_bytes);
   }
 
-  /// Codec small uses the form of codec fast for pages that become smaller so, such as grids with alternating
+  /// Codec small stores a page in the form of codec fast if that is smaller, as it is for grids with alternating
   /// diagonals.
   void encode(EncodedPage& page, const PageRange& range, StreamBits& bits) {
     page.record.form = static_cast<uint32_t>(PageCodec::kFast);

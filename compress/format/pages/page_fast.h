@@ -23,10 +23,10 @@ namespace packtrace::page_fast {
 
 /// The parts of a page, in order.
 enum Part : uint32_t {
-  kFields,         ///< bit fields
-  kHeaders,        ///< headers of all clusters, transposed: byte 0 of all headers first
-  kBits,           ///< per cluster, each starting at a whole byte: turns, fresh corners, creases; or diagonals
-  kRuns,           ///< triangle count of each strip
+  kFields,  ///< bit fields
+  kHeaders, ///< headers of all clusters, transposed: byte 0 of all headers first
+  kBits,    ///< per cluster, each starting at a whole byte: turns, fresh corners, creases; of a grid its diagonals
+  kRuns,    ///< triangle count of each strip
   kReusedVertices, ///< vertices of corners that are not fresh, and the originals of creases
   kResiduals,      ///< the byte above the low bits of each residual, in kClasses parts
   kParts = kResiduals + 4
@@ -40,7 +40,8 @@ inline constexpr uint32_t kChannelFields = 3; ///< maximum number of fields per 
 
 /// Borders of a grid cluster that it can share with an earlier one of the page.
 enum GridBorder : uint32_t { kLeftColumn, kLowestRow, kGridBorders };
-/// The diagonals of the grid are stored, else they are those of the page's last grid; before the first, all are 0.
+/// Flag: the diagonals of the grid are stored. Without it, they are those of the page's previous grid cluster, or all
+/// 0.
 inline constexpr uint8_t kGridDiagonals = 128;
 
 /// Header of a cluster. Differences are zigzag numbers relative to the cluster before.
@@ -60,13 +61,14 @@ struct Header {
   std::array<uint8_t, 2> normal_bits;
   std::array<uint8_t, kChannels * kChannelFields - 1>
       coding; ///< per field: number of low bits, plus 64 times the class
-  /// Columns of the GridBlock whose strips the cluster has, plus kGridDiagonals; 0: the strips are stored. The counts
-  /// of triangles and vertices tell the rows.
+  /// 0: the strips are stored. Else the cluster has the strips of a GridBlock with this number of columns; the rows
+  /// follow from the number of triangles. May include kGridDiagonals.
   uint8_t grid;
-  /// Which earlier grid clusters of the page have the points of the left column and of the lowest row, in their right
-  /// column and highest row: how many grid clusters before this one, or 0.
+  /// Distances to the earlier grid clusters whose right column is the left column here, and whose highest row is the
+  /// lowest row here, counted in grid clusters of the page; 0: none.
   std::array<uint8_t, kGridBorders> neighbour;
-  std::array<uint8_t, kGridBorders> shared; ///< bit c: the words of channel c there follow from the neighbour's
+  std::array<uint8_t, kGridBorders>
+      shared; ///< bit c: the words of channel c on this border follow from the neighbour's
 };
 inline constexpr size_t kHeaderBytes = 48;
 static_assert(sizeof(Header) == kHeaderBytes && std::is_trivially_copyable_v<Header>);
@@ -101,8 +103,8 @@ inline Layout normal_layout(const baked::GeometryRecord& geometry, const baked::
   return {3, {record.normal_bits[1], record.normal_bits[0], normal_chart_bits(geometry, record)}};
 }
 
-/// Returns the size of a grid cluster, without its diagonals. Returns no quads if no size has these numbers of
-/// triangles and vertices.
+/// Returns the GridBlock of a grid cluster, with diagonals 0. Returns an empty block if its numbers of triangles and
+/// vertices do not fit the columns.
 inline GridBlock grid_size(uint8_t grid, uint32_t triangles, uint32_t vertices) {
   const uint32_t columns = grid & (kGridDiagonals - 1u);
   if (columns == 0 || triangles % (2 * columns) != 0) return {};
@@ -110,7 +112,7 @@ inline GridBlock grid_size(uint8_t grid, uint32_t triangles, uint32_t vertices) 
   return block.point_count() == vertices ? block : GridBlock{};
 }
 
-/// Least coordinates of the fields of one channel of a cluster, which its words count from.
+/// Offsets of the fields of one channel of a cluster: coordinate = anchor + field.
 using Anchors = std::array<uint64_t, kChannelFields>;
 
 inline Anchors position_anchors(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record) {
@@ -121,7 +123,7 @@ inline Anchors position_anchors(const baked::GeometryRecord& geometry, const bak
   return anchors;
 }
 
-/// Anchors of the fields of normal_layout(); none for indices of a palette.
+/// Anchors of the fields of normal_layout(); 0 for indices of a palette.
 inline Anchors normal_anchors(const baked::ClusterRecord& record) {
   if (record.normal_palette != 0) return {};
   return {static_cast<uint64_t>(int64_t{record.normal_anchor[1]} * 2),
@@ -133,7 +135,7 @@ struct ChannelFrame {
   Layout layout;
   Anchors anchors{};
 
-  /// Whether words of this channel can follow from those of `other`.
+  /// Whether moved_word() applies: both channels are present, have the same fields and are predicted.
   bool can_share(const ChannelFrame& other) const {
     return layout.field_count != 0 && layout.field_count == other.layout.field_count && !layout.verbatim() &&
            !other.layout.verbatim();
@@ -146,7 +148,7 @@ inline uint64_t field_of(const Layout& layout, uint64_t word, uint32_t field) {
   return (word >> shift) & ((uint64_t{1} << layout.width[field]) - 1);
 }
 
-/// Reads the frame of texture coordinates from the bits before their words.
+/// Reads the frame of texture coordinates, which precedes their words in the bit stream.
 inline ChannelFrame read_uv_frame(const uint8_t* bits, uint64_t at) {
   ChannelFrame frame{{2, {}}, {}};
   for (uint32_t i = 0; i < 2; ++i, at += kUvAnchorBits)
@@ -157,8 +159,8 @@ inline ChannelFrame read_uv_frame(const uint8_t* bits, uint64_t at) {
   return frame;
 }
 
-/// Returns the word in frame `to` that has the same coordinates as `word` in frame `from`. Its fields overflow, modulo
-/// 2^64, if they are too narrow.
+/// Returns the word in frame `to` with the coordinates that `word` has in frame `from`. A coordinate that does not fit
+/// its field carries into the next one; the sum is modulo 2^64.
 inline uint64_t moved_word(const ChannelFrame& from, uint64_t word, const ChannelFrame& to) {
   uint64_t moved = 0;
   for (uint32_t i = 0, shift = 0; i < to.layout.field_count; shift += to.layout.width[i], ++i)

@@ -20,7 +20,8 @@ constexpr int32_t kNoVertex = -1;
 static_assert(kNoVertex == kNoPoint);
 constexpr uint32_t kMaxEscapes = 255, kMaxCreases = 255;
 constexpr size_t kMaxNeighbour = 255;
-constexpr size_t kRepetitive = 8; ///< minimum ratio of sizes at which a part is compressed with more effort
+constexpr size_t kRepetitive =
+    8; ///< parts that shrink to less than 1 / kRepetitive are compressed again, with more effort
 constexpr std::array<PageStream, kChannels> kStreamOf{PageStream::kPositions, PageStream::kNormals, PageStream::kUvs};
 
 void put_bytes(std::vector<uint8_t>& to, const BitWriter& writer) {
@@ -59,8 +60,8 @@ std::vector<uint8_t> zip(ZSTD_CCtx* zstd, const std::vector<uint8_t>& bytes) {
 }
 
 /// Compresses to a zstd frame with hardly anything but Huffman codes, which decodes fastest; shorter matches would make
-/// pages only 0.3 % smaller. Parts that mostly repeat, as those of grids do, are searched for all matches. Returns the
-/// bytes unchanged if that saves less than 5 %.
+/// pages only 0.3 % smaller. Highly repetitive parts, such as those of grids, get zstd's level 19. Returns the bytes
+/// unchanged if that saves less than 5 %.
 std::vector<uint8_t> zip_part(ZSTD_CCtx* zstd, const std::vector<uint8_t>& bytes) {
   if (bytes.empty()) return {};
   ZSTD_CCtx_reset(zstd, ZSTD_reset_session_and_parameters);
@@ -160,7 +161,7 @@ void FastPageWriter::find_creases(const ClusterView& view) {
   header_.creases = static_cast<uint8_t>(count);
 }
 
-/// Finds the GridBlock that has the cluster's strips. Returns false if there is none.
+/// Sets block_ to the GridBlock with the strips of the cluster. Returns false if there is none.
 bool FastPageWriter::find_grid() {
   if (header_.creases != 0) return false;
   const ClusterValues& values = *values_;
@@ -182,7 +183,7 @@ bool FastPageWriter::find_grid() {
   return false;
 }
 
-/// Finds an earlier grid cluster with the same points on a border, and the channels that have equal values there.
+/// Finds an earlier grid cluster that has the points of a border, and the channels in which their values are equal.
 void FastPageWriter::find_neighbour(const ClusterView& view, GridBorder border) {
   const auto vertex = [&](uint32_t i) {
     return strips_.vertex_of_point[border == kLeftColumn ? block_.point(0, i) : block_.point(i, 0)];

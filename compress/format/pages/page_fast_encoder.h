@@ -71,8 +71,8 @@ private:
   baked::ClusterRecord last_{};
   uint64_t last_diagonals_ = 0; ///< of the page's last grid cluster
   page_fast::GridBorders borders_;
-  /// The newest grid cluster by the first two points on a border that later ones can share: number of the page's grid
-  /// clusters up to it.
+  /// Per kind of border: the first two points of a border that later grid clusters can share, and the number of grid
+  /// clusters of the page up to the newest one that has it.
   std::array<std::map<std::array<LatticePoint, 2>, size_t>, page_fast::kGridBorders> newest_at_;
 
   // State of the current cluster.

@@ -31,7 +31,7 @@ void walk_grid(const GridBlock& block, const SharedBorders& shared, const uint64
     words += stride;
     if (left == nullptr) step += *residuals++;
     words[0] = left != nullptr ? left[y] : below[0] + step;
-    uint64_t rise = words[0] - below[0]; // of the point before, from the row below
+    uint64_t rise = words[0] - below[0]; // from the row below to this one, at the previous point
     for (uint32_t x = 1; x < stride; ++x) {
       rise += *residuals++;
       words[x] = below[x] + rise;

@@ -15,13 +15,13 @@ inline uint32_t points_of(const GridBlock& block, GridBorder border) {
   return (border == kLeftColumn ? block.rows : block.columns) + 1;
 }
 
-/// Returns the number of a block's points whose words do not follow from a neighbour.
+/// Returns the number of points of a block that are on no shared border.
 inline uint32_t count_unshared(const GridBlock& block, bool left, bool below) {
   return (left ? block.columns : block.columns + 1) * (below ? block.rows : block.rows + 1);
 }
 
-/// Points p, q, o that predict a point of a grid as p + q - o: a parallelogram, or a straight line with even steps on
-/// the borders. kNoPoint means 0.
+/// Returns the points p, q, o that predict a point of a grid as p + q - o: by a parallelogram, on the left column and
+/// the lowest row by continuing the last step. kNoPoint means 0.
 inline constexpr int32_t kNoPoint = -1;
 std::array<int32_t, 3> grid_guess(const GridBlock& block, uint32_t x, uint32_t y);
 
@@ -30,8 +30,8 @@ std::array<int32_t, 3> grid_guess(const GridBlock& block, uint32_t x, uint32_t y
 /// @param words set by grid point
 void walk_grid(const GridBlock& block, const SharedBorders& shared, const uint64_t* residuals, uint64_t* words);
 
-/// The borders that the grid clusters of a page have in common with later ones: right columns, which are left columns
-/// there, and highest rows, which are lowest rows there.
+/// The right columns and highest rows of the grid clusters of a page, from which later clusters take their left columns
+/// and lowest rows.
 class GridBorders {
 public:
   using Frames = std::array<ChannelFrame, kChannels>;
@@ -44,7 +44,7 @@ public:
   void add(const GridBlock& block, const Frames& frames, const std::array<const uint64_t*, kChannels>& words);
 
   /// Computes the words of a channel on a border of the next cluster, from those of an earlier cluster. Returns false
-  /// if there is no such cluster, or if it has another number of points there or no words of this kind.
+  /// if there is no such cluster, if its border has another number of points, or if its words do not fit.
   /// @param neighbour number of the earlier cluster, counted backwards from 1
   bool share(GridBorder border, size_t neighbour, Channel channel, const GridBlock& block, const ChannelFrame& frame,
              uint64_t* words) const;

@@ -16,7 +16,6 @@ class Grid:
         self.rows = triangles // (2 * self.columns)
         self.diagonals = None  # bits per quad
         self.points = [(x, y) for y in range(self.rows + 1) for x in range(self.columns + 1)]
-        self.number_of = {point: number for number, point in enumerate(self.points)}
 
     def triangles(self):
         """Triangles in strip order, as triples of points."""
