@@ -6,8 +6,9 @@
 #include <functional>
 #include <map>
 #include <numbers>
-#include <random>
 #include <utility>
+
+#include "assets/generator/random.h"
 
 namespace packtrace {
 namespace {
@@ -15,23 +16,14 @@ namespace {
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr uint32_t kPoints = 175; ///< points per side of a height field
 
-/// Random numbers of which all standard libraries give the same.
-class Random {
-public:
-  explicit Random(uint32_t seed) : engine_(seed) {}
-  double unit() { return static_cast<double>(engine_()) / 4294967296.0; }
-  uint32_t below(uint32_t count) { return static_cast<uint32_t>(engine_() % count); }
-
-private:
-  std::mt19937 engine_;
-};
+using scenegen::Random;
 
 /// How quads (a, b, c, d) are cut.
 enum class Cut { kEqual, kAlternating, kShorter };
 
 using Surface = std::function<DVec3(uint32_t, uint32_t)>;
 
-/// @param closed_columns, closed_rows the last column, or row, of quads ends at the first points
+/// @param closed_columns, closed_rows whether quads also join the last column, or row, of points to the first
 Mesh make_quads(const Surface& place, uint32_t columns, uint32_t rows, bool closed_columns = false,
                 bool closed_rows = false, Cut cut = Cut::kEqual) {
   Mesh mesh;
@@ -62,12 +54,12 @@ double waves(uint32_t i, uint32_t j) { return 0.05 * std::sin(0.11 * i) * std::c
 
 Mesh make_noise() {
   Random random(1);
-  return make_heights([&](uint32_t, uint32_t) { return 0.002 * random.unit(); });
+  return make_heights([&](uint32_t, uint32_t) { return 0.002 * random.uniform(); });
 }
 
 Mesh make_rough_waves(Cut cut) {
   Random random(2);
-  return make_heights([&](uint32_t i, uint32_t j) { return waves(i, j) + 0.001 * random.unit(); }, cut);
+  return make_heights([&](uint32_t i, uint32_t j) { return waves(i, j) + 0.001 * random.uniform(); }, cut);
 }
 
 /// Six octaves of value noise.
@@ -76,7 +68,7 @@ Mesh make_terrain() {
   std::map<std::pair<int, int>, double> values;
   const auto value = [&](int x, int y) {
     const auto [at, is_new] = values.try_emplace({x, y});
-    if (is_new) at->second = random.unit();
+    if (is_new) at->second = random.uniform();
     return at->second;
   };
   const auto noise = [&](double x, double y) {
@@ -186,41 +178,38 @@ Mesh make_icosphere() {
   return mesh;
 }
 
-constexpr std::array<std::string_view, 12> kNames{
-    "grid-waves",      "grid-noise", "grid-terrain",  "grid-hole",      "grid-sphere",      "grid-torus",
-    "grid-thin-torus", "grid-knot",  "grid-cylinder", "grid-icosphere", "grid-alternating", "grid-shorter"};
+struct GridInput {
+  std::string_view name;
+  Mesh (*make)();
+};
+constexpr std::array kInputs{GridInput{"grid-waves",
+                                       [] {
+                                         return make_heights([](uint32_t i, uint32_t j) {
+                                           return 0.1 * std::sin(0.05 * i) * std::cos(0.07 * j);
+                                         });
+                                       }},
+                             GridInput{"grid-noise", make_noise},
+                             GridInput{"grid-terrain", make_terrain},
+                             GridInput{"grid-hole", make_hole},
+                             GridInput{"grid-sphere", make_sphere},
+                             GridInput{"grid-torus", [] { return make_torus(300, 100, 1.0 / 3.0); }},
+                             GridInput{"grid-thin-torus", [] { return make_torus(300, 12, 0.04); }},
+                             GridInput{"grid-knot", make_knot},
+                             GridInput{"grid-cylinder", make_cylinder},
+                             GridInput{"grid-icosphere", make_icosphere},
+                             GridInput{"grid-alternating", [] { return make_rough_waves(Cut::kAlternating); }},
+                             GridInput{"grid-shorter", [] { return make_rough_waves(Cut::kShorter); }}};
+
+constexpr auto kNames = [] {
+  std::array<std::string_view, kInputs.size()> names;
+  for (size_t i = 0; i < names.size(); ++i) names[i] = kInputs[i].name;
+  return names;
+}();
 
 } // namespace
 
 std::span<const std::string_view> grid_input_names() { return kNames; }
 
-Mesh make_grid_input(std::string_view name) {
-  switch (std::ranges::find(kNames, name) - kNames.begin()) {
-  case 0:
-    return make_heights([](uint32_t i, uint32_t j) { return 0.1 * std::sin(0.05 * i) * std::cos(0.07 * j); });
-  case 1:
-    return make_noise();
-  case 2:
-    return make_terrain();
-  case 3:
-    return make_hole();
-  case 4:
-    return make_sphere();
-  case 5:
-    return make_torus(300, 100, 1.0 / 3.0);
-  case 6:
-    return make_torus(300, 12, 0.04);
-  case 7:
-    return make_knot();
-  case 8:
-    return make_cylinder();
-  case 9:
-    return make_icosphere();
-  case 10:
-    return make_rough_waves(Cut::kAlternating);
-  default:
-    return make_rough_waves(Cut::kShorter);
-  }
-}
+Mesh make_grid_input(std::string_view name) { return std::ranges::find(kInputs, name, &GridInput::name)->make(); }
 
 } // namespace packtrace
