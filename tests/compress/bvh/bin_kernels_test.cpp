@@ -57,22 +57,36 @@ Bins bins_of(const std::vector<TreeBox>& boxes, uint32_t count) {
   return bins;
 }
 
+struct Side {
+  TreeBox bounds; ///< undefined if it has no boxes
+  uint32_t count = 0;
+  void extend(const Side& other) {
+    if (other.count == 0) return;
+    if (count == 0) bounds = other.bounds;
+    bounds.extend(other.bounds);
+    count += other.count;
+  }
+};
+
 /// Tries all splits between bins; sorts the boxes of the best one into `order`. Returns the number on the left.
 uint32_t split_plainly(const std::vector<TreeBox>& boxes, const Bins& bins, uint32_t unit,
                        std::vector<uint32_t>& order) {
   double least = std::numeric_limits<double>::infinity();
   size_t best_axis = 0;
   uint32_t best = 0;
-  for (size_t axis = 0; axis < 3; ++axis)
+  for (size_t axis = 0; axis < 3; ++axis) {
+    std::vector<Side> in_bin(bins.count);
+    for (const TreeBox& box : boxes) in_bin[bin_of(box, axis, bins)].extend({box, 1});
     for (uint32_t bin = 1; bin < bins.count; ++bin) {
-      std::array<std::vector<TreeBox>, 2> sides;
-      for (const TreeBox& box : boxes) sides[bin_of(box, axis, bins) < bin ? 0 : 1].push_back(box);
-      if (sides[0].empty() || sides[1].empty()) continue;
+      std::array<Side, 2> sides;
+      for (uint32_t i = 0; i < bins.count; ++i) sides[i < bin ? 0 : 1].extend(in_bin[i]);
+      if (sides[0].count == 0 || sides[1].count == 0) continue;
       double cost = 0.0;
-      for (const std::vector<TreeBox>& side : sides)
-        cost += bounds_of(side).half_area() * static_cast<double>((side.size() + unit - 1) / unit);
+      for (const Side& side : sides)
+        cost += side.bounds.half_area() * static_cast<double>((side.count + unit - 1) / unit);
       if (cost < least) least = cost, best_axis = axis, best = bin;
     }
+  }
   if (best == 0) return 0;
   const auto middle =
       std::partition(order.begin(), order.end(), [&](uint32_t i) { return bin_of(boxes[i], best_axis, bins) < best; });

@@ -181,8 +181,8 @@ Mesh triangles_around_an_edge() {
   return mesh;
 }
 
-/// Triangles of the soup, of which no two merge: errors of its levels take long to measure under sanitizers.
-const uint32_t kSoup = test::sanitized() ? 1500 : 6000;
+/// Triangles of the soup. No two merge, so that each distance from its levels takes time in proportion to their number.
+const uint32_t kSoup = test::sanitized() ? 1500 : 2500;
 
 } // namespace
 
