@@ -29,6 +29,9 @@ BenchmarkOption& BenchmarkOption::not_negative() { return cli(option_).check(CLI
 BenchmarkOption& BenchmarkOption::one_of(const std::vector<std::string>& values) {
   return cli(option_).check(CLI::IsMember(values)), *this;
 }
+BenchmarkOption& BenchmarkOption::one_of_or_file(const std::vector<std::string>& values) {
+  return cli(option_).check(CLI::IsMember(values) | CLI::ExistingFile), *this;
+}
 BenchmarkOption& BenchmarkOption::existing_folder() { return cli(option_).check(CLI::ExistingDirectory), *this; }
 
 struct BenchmarkOptions::App : CLI::App {

@@ -31,6 +31,7 @@ public:
   BenchmarkOption& positive();
   BenchmarkOption& not_negative();
   BenchmarkOption& one_of(const std::vector<std::string>& values);
+  BenchmarkOption& one_of_or_file(const std::vector<std::string>& values);
   BenchmarkOption& existing_folder();
 
 private:

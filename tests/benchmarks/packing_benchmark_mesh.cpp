@@ -16,6 +16,8 @@
 namespace packtrace {
 namespace {
 
+constexpr std::array<const char*, 3> kSceneNames{"bunny", "spaceship", "house"};
+
 std::vector<Vec3> area_weighted_normals(const std::vector<Vec3>& positions, const std::vector<Triangle>& triangles) {
   std::vector<DVec3> sums(positions.size(), DVec3(0.0));
   for (const Triangle& t : triangles) {
@@ -125,17 +127,25 @@ PackingInput find_packing_input(const std::string& name, const std::filesystem::
                                 uint64_t generated_triangles) {
   if (const auto grids = grid_input_names(); std::ranges::find(grids, name) != grids.end())
     return grid_packing_input(name);
-  if (name != "generated") return load_packing_input(name, scenes / name / "scene.pbrt", name == "bunny");
-  const TemporaryFolder folder;
-  return generated_packing_input(generated_triangles, folder.path());
+  if (name == "generated") {
+    const TemporaryFolder folder;
+    return generated_packing_input(generated_triangles, folder.path());
+  }
+  if (std::ranges::find(kSceneNames, name) != kSceneNames.end())
+    return load_packing_input(name, scenes / name / "scene.pbrt", name == "bunny");
+  return load_packing_input(name, name, false);
 }
 
 void PackingInputs::add_to(BenchmarkOptions& command_line) {
   command_line.add("--scenes", scenes, "holds bunny, spaceship and house").environment("PACKTRACE_SCENES");
   command_line.add("--generated-triangles", generated_triangles, "of the generated mesh").show_default();
-  std::vector<std::string> known{"bunny", "spaceship", "house", "generated", "grids"};
+  std::vector<std::string> known(kSceneNames.begin(), kSceneNames.end());
+  known.insert(known.end(), {"generated", "grids"});
   known.insert(known.end(), grid_input_names().begin(), grid_input_names().end());
-  command_line.add("INPUT", names, "which; `grids` are all grid-...; if none is named, all but those").one_of(known);
+  command_line
+      .add("INPUT", names,
+           "which, or scenes and mesh files; `grids` are all grid-...; if none is named, all but grids and files")
+      .one_of_or_file(known);
 }
 
 void PackingInputs::choose() {
@@ -145,7 +155,7 @@ void PackingInputs::choose() {
   }
   if (!names.empty()) return;
   names = {"generated"};
-  if (!scenes.empty()) names.insert(names.begin(), {"bunny", "spaceship", "house"});
+  if (!scenes.empty()) names.insert(names.begin(), kSceneNames.begin(), kSceneNames.end());
 }
 
 double median_edge(const Mesh& mesh) {
