@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "compress/bake/clusters/grid_blocks.h"
+#include "compress/bake/clusters/repeated_clusters.h"
 #include "compress/bake/level_chain.h"
 #include "compress/bake/proxies/proxy_config.h"
 #include "compress/format/cluster/normal_codec.h"
@@ -96,15 +96,15 @@ struct BakeConfig {
 
   /// Compression of pages on disk. Decoded data do not depend on it.
   PageCodec codec = PageCodec::kNone;
-  /// Which regular grids are cut into blocks of quads. Codec fast has a form for blocks, and codec small stores the
-  /// topology of equal blocks once. Blocks change clusters and trees, but not the surface.
-  GridBlocks grid_blocks = GridBlocks::kNone;
-  /// Sets the codec and the grid_blocks that give it the smallest files.
+  /// Which clusters are cut alike, as codecs fast and small store once what these have in common. It changes clusters
+  /// and trees, but not the surface.
+  RepeatedClusters repeated_clusters = RepeatedClusters::kNone;
+  /// Sets the codec and the repeated_clusters that give it the smallest files.
   void choose_codec(PageCodec chosen) {
     codec = chosen;
-    grid_blocks = chosen == PageCodec::kFast    ? GridBlocks::kPartly
-                  : chosen == PageCodec::kSmall ? GridBlocks::kMostly
-                                                : GridBlocks::kNone;
+    repeated_clusters = chosen == PageCodec::kFast    ? RepeatedClusters::kMost
+                        : chosen == PageCodec::kSmall ? RepeatedClusters::kMany
+                                                      : RepeatedClusters::kNone;
   }
 
   bool trees = true; ///< store trees over the clusters; otherwise they are built before tracing

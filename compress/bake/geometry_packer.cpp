@@ -93,7 +93,7 @@ GeometryPacker::Draft GeometryPacker::pack_with(size_t index, const GeometryNeed
   Draft draft;
   draft.quantized = quantize(index, needs);
   const QuantizedGeometry& q = draft.quantized;
-  draft.clusters = split_geometry(q, config_.grid_blocks);
+  draft.clusters = split_geometry(q, config_.repeated_clusters);
   draft.packed = {record_of(plan, q, position_error_bound(grids_[index].coarsest_step(), measure.max_abs())),
                   encode_geometry(q, draft.clusters),
                   q.stats,

@@ -55,7 +55,7 @@ set(packtrace_public_headers
   compress/bake/level_chain.h
   compress/bake/bake_scene.h
   compress/bake/grid/seam_gaps.h
-  compress/bake/clusters/grid_blocks.h
+  compress/bake/clusters/repeated_clusters.h
   compress/bake/proxies/proxy_config.h
   compress/bake/proxies/voxel_rule.h
   # packtrace::vertex16: a baked file to vertex and index buffers

@@ -262,7 +262,7 @@ TEST(FastPage, CreasesShareThePlaceOfAnOlderVertex) {
 
 TEST(FastPage, BlocksOfAGridShareTheirBorders) {
   BakeConfig config;
-  config.grid_blocks = GridBlocks::kPartly;
+  config.repeated_clusters = RepeatedClusters::kMost;
   const std::vector<Header> headers = headers_of(test::scene_of(test::grid_mesh(64, 0.1f, true)), config);
   ASSERT_EQ(headers.size(), 64u); // 8 x 8 blocks
   const auto shared = [&](GridBorder border, Channel channel) {

@@ -85,7 +85,7 @@ TEST(AssetScene, EqualBlocksNeverTakeMoreBytes) {
         config.precision = bits;
         config.choose_codec(codec);
         const size_t with_blocks = test::bake(scene, config).bytes.size();
-        config.grid_blocks = GridBlocks::kNone;
+        config.repeated_clusters = RepeatedClusters::kNone;
         EXPECT_LE(with_blocks, test::bake(scene, config).bytes.size())
             << file << ", " << name_of(codec) << ", " << bits;
       }

@@ -92,7 +92,7 @@ TEST(RegularBlocks, AllBlocksOfAGridHaveTheSameStrips) {
     return LatticePoint{100 * int64_t{i} + random.bits() % 30, 100 * int64_t{j} + random.bits() % 30,
                         random.bits() % 80};
   });
-  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, GridBlocks::kMostly);
+  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, RepeatedClusters::kMany);
   EXPECT_EQ(count_triangles(geometry, blocks), geometry.triangles.size());
   expect_equal_strips(geometry, blocks);
 }
@@ -112,14 +112,14 @@ TEST(RegularBlocks, DiagonalsMayAlternate) {
         if ((q % 80 + q / 80) % 2 == odd) turn_diagonal(geometry, 80, q);
       return geometry;
     }();
-    const std::vector<RegularBlock> blocks = find_regular_blocks(all, GridBlocks::kMostly);
+    const std::vector<RegularBlock> blocks = find_regular_blocks(all, RepeatedClusters::kMany);
     EXPECT_GE(count_triangles(all, blocks), odd == 1 ? all.triangles.size() : all.triangles.size() * 4 / 5);
     expect_equal_strips(all, blocks);
     // A hole and its irregular surroundings do not spoil the rest.
     QuantizedGeometry open = all;
     open.triangles.erase(open.triangles.begin() + 2 * (20 * 80 + 30), open.triangles.begin() + 2 * (20 * 80 + 37));
     open.kind_of.resize(open.triangles.size());
-    EXPECT_GE(count_triangles(open, find_regular_blocks(open, GridBlocks::kMostly)), open.triangles.size() * 3 / 4);
+    EXPECT_GE(count_triangles(open, find_regular_blocks(open, RepeatedClusters::kMany)), open.triangles.size() * 3 / 4);
   }
 }
 
@@ -132,7 +132,7 @@ TEST(RegularBlocks, DiagonalsMayBeAnyIfTheyAreLongest) {
   QuantizedGeometry geometry = grid(64, 48, bumps);
   for (uint32_t q = 0; q < geometry.triangles.size() / 2; ++q)
     if (random.bits() % 2 == 0) turn_diagonal(geometry, 64, q);
-  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, GridBlocks::kMostly);
+  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, RepeatedClusters::kMany);
   EXPECT_EQ(count_triangles(geometry, blocks), geometry.triangles.size());
   for (const RegularBlock& block : blocks) {
     EXPECT_EQ(strips_of(geometry, block).layout.vertex_count, 81u);
@@ -146,11 +146,12 @@ std::span<const uint32_t> triangles_of(const RegularBlock& block) {
 
 TEST(RegularBlocks, BlocksFillClosedGridsAndAlignWithBorders) {
   const QuantizedGeometry torus = grid(64, 32, flat, true);
-  EXPECT_GE(count_triangles(torus, find_regular_blocks(torus, GridBlocks::kMostly)), torus.triangles.size() * 9 / 10);
+  EXPECT_GE(count_triangles(torus, find_regular_blocks(torus, RepeatedClusters::kMany)),
+            torus.triangles.size() * 9 / 10);
   const QuantizedGeometry open = grid(35, 19, flat); // holds 5 x 2 blocks of 7 x 9 quads
-  EXPECT_EQ(count_triangles(open, find_regular_blocks(open, GridBlocks::kMostly)), 10u * 126u);
+  EXPECT_EQ(count_triangles(open, find_regular_blocks(open, RepeatedClusters::kMany)), 10u * 126u);
   const QuantizedGeometry tube = grid(300, 12, flat, true);
-  EXPECT_GE(count_triangles(tube, find_regular_blocks(tube, GridBlocks::kMostly)), tube.triangles.size() * 9 / 10);
+  EXPECT_GE(count_triangles(tube, find_regular_blocks(tube, RepeatedClusters::kMany)), tube.triangles.size() * 9 / 10);
 }
 
 TEST(RegularBlocks, ElongatedQuadsAreGatheredAcross) {
@@ -158,7 +159,7 @@ TEST(RegularBlocks, ElongatedQuadsAreGatheredAcross) {
     const QuantizedGeometry geometry = grid(64, 64, [&](uint32_t i, uint32_t j) {
       return LatticePoint{int64_t{i} * (tall ? 10 : 50), int64_t{j} * (tall ? 50 : 10), 0};
     });
-    const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, GridBlocks::kMostly);
+    const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, RepeatedClusters::kMany);
     EXPECT_EQ(count_triangles(geometry, blocks), geometry.triangles.size());
     for (const RegularBlock& block : blocks) {
       LatticePoint lo{1 << 20, 1 << 20, 0}, hi{};
@@ -180,7 +181,7 @@ TEST(RegularBlocks, KindsAndSplitVerticesEndBlocks) {
   for (size_t t = 0; t < geometry.triangles.size(); ++t) // another kind from column 12 on
     if (t / 2 % 32 >= 12) geometry.kind_of[t] = 1;
   geometry.kinds.resize(2);
-  for (const RegularBlock& block : find_regular_blocks(geometry, GridBlocks::kMostly))
+  for (const RegularBlock& block : find_regular_blocks(geometry, RepeatedClusters::kMany))
     for (const uint32_t t : triangles_of(block)) EXPECT_EQ(geometry.kind_of[t], geometry.kind_of[block.triangles[0]]);
 
   geometry = grid(32, 32, flat);
@@ -190,7 +191,7 @@ TEST(RegularBlocks, KindsAndSplitVerticesEndBlocks) {
   geometry.vertices.resize(2 * geometry.vertices.size());
   for (size_t v = 0; v < geometry.vertices.size(); ++v)
     geometry.vertices[v].position = static_cast<uint32_t>(v % geometry.positions.size());
-  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, GridBlocks::kMostly);
+  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, RepeatedClusters::kMany);
   EXPECT_GE(count_triangles(geometry, blocks), geometry.triangles.size() * 3 / 4);
   for (const RegularBlock& block : blocks)
     EXPECT_LE(2 * strips_of(geometry, block).layout.vertex_count, block.triangle_count + 36u);
@@ -202,8 +203,8 @@ TEST(RegularBlocks, PartsWithManyDefectsHaveFewerBlocks) {
     for (uint32_t i = 5; i < 120; i += 12) geometry.triangles[2 * (j * 120 + i)] = {0, 0, 0};
   std::erase_if(geometry.triangles, [](const Triangle& t) { return t.x == t.y; });
   geometry.kind_of.resize(geometry.triangles.size());
-  EXPECT_TRUE(find_regular_blocks(geometry, GridBlocks::kMostly).empty());
-  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, GridBlocks::kPartly);
+  EXPECT_TRUE(find_regular_blocks(geometry, RepeatedClusters::kMany).empty());
+  const std::vector<RegularBlock> blocks = find_regular_blocks(geometry, RepeatedClusters::kMost);
   EXPECT_GE(count_triangles(geometry, blocks), geometry.triangles.size() * 3 / 10);
   EXPECT_EQ(blocks[0].triangle_count, 64u);
 }
@@ -212,8 +213,8 @@ TEST(RegularBlocks, IrregularMeshesHaveNone) {
   test::Random random(2);
   QuantizedGeometry soup = grid(20, 20, flat);
   for (Triangle& t : soup.triangles) t = {random.bits() % 441, random.bits() % 441, random.bits() % 441};
-  EXPECT_TRUE(find_regular_blocks(soup, GridBlocks::kMostly).empty());
-  EXPECT_TRUE(find_regular_blocks({}, GridBlocks::kMostly).empty());
+  EXPECT_TRUE(find_regular_blocks(soup, RepeatedClusters::kMany).empty());
+  EXPECT_TRUE(find_regular_blocks({}, RepeatedClusters::kMany).empty());
 }
 
 TEST(RegularBlocks, RepeatedAndTurnedTrianglesDoNoHarm) {
@@ -228,7 +229,7 @@ TEST(RegularBlocks, RepeatedAndTurnedTrianglesDoNoHarm) {
       if (k % 3 == 2) t.z = random.bits() % static_cast<uint32_t>(geometry.vertices.size());
     }
     const GeometryClusters clusters =
-        split_geometry(geometry, round % 4 < 2 ? GridBlocks::kMostly : GridBlocks::kPartly);
+        split_geometry(geometry, round % 4 < 2 ? RepeatedClusters::kMany : RepeatedClusters::kMost);
     std::multiset<std::array<uint32_t, 3>> left;
     for (const Triangle& t : geometry.triangles) left.insert(test::rotated_to_smallest(t));
     for (const Triangle& t : clusters.triangles) {
@@ -237,7 +238,7 @@ TEST(RegularBlocks, RepeatedAndTurnedTrianglesDoNoHarm) {
       left.erase(found);
     }
     EXPECT_TRUE(left.empty());
-    with_blocks += std::ranges::any_of(clusters.clusters, [](const ClusterRange& c) { return c.regular != 0; });
+    with_blocks += std::ranges::any_of(clusters.clusters, [](const ClusterRange& c) { return c.ordered != 0; });
   }
   EXPECT_GT(with_blocks, 10);
 }

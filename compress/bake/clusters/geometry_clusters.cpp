@@ -7,10 +7,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/clusters/cluster_cutter.h"
 #include "compress/bake/clusters/morton.h"
 #include "compress/bake/clusters/regular_blocks.h"
-#include "compress/bake/clusters/renumbering.h"
+#include "compress/bake/clusters/repeated_parts.h"
+#include "compress/bake/clusters/triangle_cutter.h"
 #include "compress/bake/clusters/triangle_order.h"
 #include "compress/format/layout/baked_format.h"
 
@@ -23,28 +23,6 @@ constexpr uint32_t kChunkTriangles = 1u << 15; // processed independently; clust
 struct Chunk {
   uint32_t begin = 0, end = 0; ///< range of the sorted triangles
 };
-
-/// Splits a chunk of sorted triangles into clusters. Their `order` indexes the chunk.
-Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const PlacedTriangle> keys) {
-  Renumbering vertex_numbers(keys.size());
-  std::vector<Triangle> vertices;
-  std::vector<TreeBox> boxes;
-  vertices.reserve(keys.size()), boxes.reserve(keys.size());
-  for (const PlacedTriangle& key : keys) {
-    const Triangle& t = geometry.triangles[key.triangle];
-    Triangle vertex{};
-    for (int corner = 0; corner < 3; ++corner) {
-      vertex[corner] = vertex_numbers(t[corner]);
-      const LatticePoint& position = geometry.positions[geometry.vertices[t[corner]].position];
-      TreeBox point;
-      for (size_t axis = 0; axis < 3; ++axis)
-        point.lo[axis] = point.hi[axis] = static_cast<float>(position[axis] - geometry.origin[axis]);
-      corner == 0 ? boxes.push_back(point) : boxes.back().extend(point);
-    }
-    vertices.push_back(vertex);
-  }
-  return cut_clusters(boxes, vertices, static_cast<uint32_t>(vertex_numbers.values.size()));
-}
 
 /// Ranks the kinds by slot first. Slots are ordered by class, so the triangles of a class are contiguous.
 std::vector<uint32_t> rank_kinds(const std::vector<TriangleKind>& kinds) {
@@ -99,64 +77,108 @@ std::vector<Chunk> split_into_chunks(std::span<const PlacedTriangle> keys) {
   return chunks;
 }
 
+class GeometrySplitter {
+public:
+  GeometrySplitter(const QuantizedGeometry& geometry, RepeatedClusters repeated)
+      : g_(geometry), rank_(rank_kinds(geometry.kinds)), keys_(sort_triangles(geometry, rank_)) {
+    out_.triangles.resize(geometry.triangles.size());
+    if (repeated != RepeatedClusters::kNone) take_repeated(repeated);
+  }
+
+  GeometryClusters run() {
+    const std::vector<Chunk> chunks = split_into_chunks(keys_);
+    std::vector<uint32_t> first_of_chunk; // in GeometryClusters::triangles
+    for (const Chunk& chunk : chunks) {
+      add_repeated_up_to(keys_[chunk.begin].rank);
+      first_of_chunk.push_back(first_);
+      first_ += chunk.end - chunk.begin;
+    }
+    add_repeated_up_to(static_cast<uint32_t>(rank_.size()));
+
+    std::vector<Clusters> cut(chunks.size());
+    tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
+      std::vector<uint32_t> triangles;
+      for (uint32_t k = chunks[i].begin; k < chunks[i].end; ++k) triangles.push_back(keys_[k].triangle);
+      cut[i] = cut_triangles(g_, triangles);
+      for (size_t k = 0; k < triangles.size(); ++k)
+        out_.triangles[first_of_chunk[i] + k] = g_.triangles[triangles[cut[i].order[k]]];
+    });
+    for (size_t i = 0; i < chunks.size(); ++i) {
+      first_ = first_of_chunk[i];
+      for (uint32_t begin = 0; const uint32_t end : cut[i].ends) {
+        add(end - begin, keys_[chunks[i].begin].triangle, 0);
+        begin = end;
+      }
+    }
+    std::ranges::sort(out_.clusters, {}, &ClusterRange::first_triangle);
+    return std::move(out_);
+  }
+
+private:
+  uint32_t rank_of(uint32_t triangle) const { return rank_[g_.kind_of[triangle]]; }
+
+  /// Finds blocks and parts that repeat, by rank, and removes their triangles from keys_.
+  void take_repeated(RepeatedClusters which) {
+    std::vector<uint8_t> taken(g_.triangles.size(), 0);
+    blocks_ = find_regular_blocks(g_, which);
+    for (const RegularBlock& block : blocks_)
+      for (uint32_t k = 0; k < block.triangle_count; ++k) taken[block.triangles[k]] = 1;
+    parts_ = find_repeated_parts(g_, taken);
+    for (const RepeatedPart& part : parts_)
+      for (const uint32_t t : part.triangles) taken[t] = 1;
+    std::ranges::stable_sort(blocks_, {}, [&](const RegularBlock& block) { return rank_of(block.triangles[0]); });
+    std::ranges::stable_sort(parts_, {}, [&](const RepeatedPart& part) { return rank_of(part.triangles[0]); });
+    std::erase_if(keys_, [&](const PlacedTriangle& key) { return taken[key.triangle] != 0; });
+  }
+
+  /// Adds a cluster of the next triangles.
+  /// @param triangle one of them, in QuantizedGeometry::triangles
+  void add(uint32_t count, uint32_t triangle, uint32_t ordered) {
+    out_.clusters.push_back({first_, count, g_.kind_of[triangle], ordered});
+    first_ += count;
+  }
+
+  /// Adds the blocks and parts of the ranks up to `last` that are not added yet. Those of a kind come before its
+  /// chunks.
+  void add_repeated_up_to(uint32_t last) {
+    for (; next_rank_ <= last; ++next_rank_) {
+      for (; next_block_ < blocks_.size() && rank_of(blocks_[next_block_].triangles[0]) == next_rank_; ++next_block_)
+        add(blocks_[next_block_]);
+      for (; next_part_ < parts_.size() && rank_of(parts_[next_part_].triangles[0]) == next_rank_; ++next_part_)
+        add(parts_[next_part_]);
+    }
+  }
+
+  void add(const RegularBlock& block) {
+    for (uint32_t k = 0; k < block.triangle_count; ++k) out_.triangles[first_ + k] = block.triangle(g_, k);
+    add(block.triangle_count, block.triangles[0], 1);
+  }
+
+  void add(const RepeatedPart& part) {
+    uint32_t k = 0;
+    for (const uint32_t end : part.ends) {
+      const uint32_t count = end - k;
+      for (uint32_t i = 0; i < count; ++i) out_.triangles[first_ + i] = g_.triangles[part.triangles[k + i]];
+      add(count, part.triangles[k], 1);
+      k = end;
+    }
+  }
+
+  const QuantizedGeometry& g_;
+  const std::vector<uint32_t> rank_; ///< per kind
+  std::vector<PlacedTriangle> keys_; ///< of the triangles that are in no block or part
+  std::vector<RegularBlock> blocks_;
+  std::vector<RepeatedPart> parts_;
+  GeometryClusters out_;
+  uint32_t first_ = 0; ///< of the next cluster, in GeometryClusters::triangles
+  uint32_t next_rank_ = 0;
+  size_t next_block_ = 0, next_part_ = 0;
+};
+
 } // namespace
 
-GeometryClusters split_geometry(const QuantizedGeometry& geometry, GridBlocks grid_blocks) {
-  const std::vector<uint32_t> rank = rank_kinds(geometry.kinds);
-  const auto rank_of = [&](uint32_t triangle) { return rank[geometry.kind_of[triangle]]; };
-  std::vector<RegularBlock> blocks;
-  if (grid_blocks != GridBlocks::kNone) blocks = find_regular_blocks(geometry, grid_blocks);
-  std::ranges::stable_sort(blocks, {}, [&](const RegularBlock& block) { return rank_of(block.triangles[0]); });
-  std::vector<PlacedTriangle> keys = sort_triangles(geometry, rank);
-  if (!blocks.empty()) {
-    std::vector<uint8_t> in_block(geometry.triangles.size(), 0);
-    for (const RegularBlock& block : blocks)
-      for (uint32_t k = 0; k < block.triangle_count; ++k) in_block[block.triangles[k]] = 1;
-    std::erase_if(keys, [&](const PlacedTriangle& key) { return in_block[key.triangle] != 0; });
-  }
-  const std::vector<Chunk> chunks = split_into_chunks(keys);
-
-  GeometryClusters result;
-  result.triangles.resize(geometry.triangles.size());
-  uint32_t first = 0; // index in result.triangles
-  const auto add = [&](uint32_t count, uint32_t kind, uint32_t regular) {
-    result.clusters.push_back({first, count, kind, regular});
-    first += count;
-  };
-  size_t next_block = 0;
-  const auto add_blocks_up_to = [&](uint32_t last_rank) {
-    for (; next_block < blocks.size() && rank_of(blocks[next_block].triangles[0]) <= last_rank; ++next_block) {
-      const RegularBlock& block = blocks[next_block];
-      for (uint32_t k = 0; k < block.triangle_count; ++k) result.triangles[first + k] = block.triangle(geometry, k);
-      add(block.triangle_count, geometry.kind_of[block.triangles[0]], 1);
-    }
-  };
-  // Reserve the range of every chunk. The blocks of a kind come before its chunks.
-  std::vector<uint32_t> first_of_chunk;
-  for (const Chunk& chunk : chunks) {
-    add_blocks_up_to(keys[chunk.begin].rank);
-    first_of_chunk.push_back(first);
-    first += chunk.end - chunk.begin;
-  }
-  add_blocks_up_to(static_cast<uint32_t>(rank.size()));
-
-  std::vector<Clusters> split(chunks.size());
-  tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
-    const std::span<const PlacedTriangle> part =
-        std::span(keys).subspan(chunks[i].begin, chunks[i].end - chunks[i].begin);
-    split[i] = split_chunk(geometry, part);
-    for (size_t k = 0; k < part.size(); ++k)
-      result.triangles[first_of_chunk[i] + k] = geometry.triangles[part[split[i].order[k]].triangle];
-  });
-  for (size_t i = 0; i < chunks.size(); ++i) {
-    first = first_of_chunk[i];
-    for (uint32_t begin = 0; const uint32_t end : split[i].ends) {
-      add(end - begin, geometry.kind_of[keys[chunks[i].begin].triangle], 0);
-      begin = end;
-    }
-  }
-  std::ranges::sort(result.clusters, {}, &ClusterRange::first_triangle);
-  return result;
+GeometryClusters split_geometry(const QuantizedGeometry& geometry, RepeatedClusters repeated) {
+  return GeometrySplitter(geometry, repeated).run();
 }
 
 } // namespace packtrace

@@ -64,10 +64,10 @@ private:
     }
     const std::span<const uint32_t> used = numbers_.values;
     for (const uint32_t vertex : used) places_.push_back(geometry_.positions[geometry_.vertices[vertex].position]);
-    if (cluster.regular == 0) groups_.find(places_, local_triangles_);
-    const std::span<const Triangle> triangles = cluster.regular != 0 ? local_triangles_ : groups_.triangles();
+    if (cluster.ordered == 0) groups_.find(places_, local_triangles_);
+    const std::span<const Triangle> triangles = cluster.ordered != 0 ? local_triangles_ : groups_.triangles();
     const auto vertex_count = static_cast<uint32_t>(used.size());
-    const Strips strips = cluster.regular != 0 ? strips_in_order(triangles, vertex_count)
+    const Strips strips = cluster.ordered != 0 ? strips_in_order(triangles, vertex_count)
                                                : find_strips(triangles, vertex_count, groups_.ends());
 
     positions_.clear(), codes_.clear(), uvs_.clear();

@@ -90,8 +90,8 @@ struct Size {
 
 class BlockFinder {
 public:
-  BlockFinder(const QuantizedGeometry& geometry, GridBlocks which)
-      : geometry_(geometry), cut_(which == GridBlocks::kPartly ? kCutPartly : kCutMostly),
+  BlockFinder(const QuantizedGeometry& geometry, RepeatedClusters which)
+      : geometry_(geometry), cut_(which == RepeatedClusters::kMost ? kCutPartly : kCutMostly),
         valence_(geometry.vertices.size(), 0) {}
 
   std::vector<RegularBlock> run() {
@@ -533,7 +533,7 @@ private:
 
 } // namespace
 
-std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry, GridBlocks which) {
+std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry, RepeatedClusters which) {
   return BlockFinder(geometry, which).run();
 }
 

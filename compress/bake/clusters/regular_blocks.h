@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/bake/clusters/grid_blocks.h"
 #include "compress/bake/clusters/quantized_geometry.h"
+#include "compress/bake/clusters/repeated_clusters.h"
 #include "compress/format/cluster/index_codec.h"
 
 namespace packtrace {
@@ -29,7 +29,7 @@ struct RegularBlock {
 /// and eight. If these hold less than half of the triangles, but three quarters are about right-angled, also looks for
 /// quads whose diagonals are the longest edges of their triangles, and returns the blocks that hold more triangles. The
 /// blocks of a grid are in row order.
-/// @param which kMostly or kPartly
-std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry, GridBlocks which);
+/// @param which kMany or kMost
+std::vector<RegularBlock> find_regular_blocks(const QuantizedGeometry& geometry, RepeatedClusters which);
 
 } // namespace packtrace

@@ -137,7 +137,8 @@ private:
 void NodeGroups::find(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
   SweepTree tree(PointBoxes(positions), triangles);
   triangles_.clear(), ends_.clear(), nodes_.clear();
-  for (const uint32_t i : tree.order()) triangles_.push_back(triangles[i]);
+  order_.assign(tree.order().begin(), tree.order().end());
+  for (const uint32_t i : order_) triangles_.push_back(triangles[i]);
   const RunNode& root = tree.nodes()[0];
   TreeCosts costs;
   costs.extra_node = kExtraGroup;

@@ -19,11 +19,13 @@ public:
   void find(std::span<const LatticePoint> positions, std::span<const Triangle> triangles);
 
   std::span<const Triangle> triangles() const { return triangles_; } ///< triangles, group by group
+  std::span<const uint8_t> order() const { return order_; }          ///< their numbers in the cluster
   std::span<const uint32_t> ends() const { return ends_; }           ///< end of each group in triangles()
 
 private:
   std::vector<LeafNode> nodes_;
   std::vector<Triangle> triangles_;
+  std::vector<uint8_t> order_;
   std::vector<uint32_t> ends_;
 };
 

@@ -253,7 +253,7 @@ BuiltLod build_lod(const Mesh& mesh) {
   result.geometry =
       quantize_geometry(scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config),
                         config, GeometryGrid{choose_grid(config, measure, 1.0), {}}, measure);
-  result.base = split_geometry(result.geometry, config.grid_blocks);
+  result.base = split_geometry(result.geometry, config.repeated_clusters);
   Progress progress;
   result.lod = build_cluster_lod(result.geometry, result.base, progress);
   return result;

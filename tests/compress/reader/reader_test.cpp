@@ -32,7 +32,7 @@ protected:
   }
 
   void write(const Scene& scene, BakeConfig config = {}) {
-    config.grid_blocks = GridBlocks::kPartly; // for every codec, so that all files hold the same clusters
+    config.repeated_clusters = RepeatedClusters::kMost; // for every codec, so that all files hold the same clusters
     for (const PageCodec codec : {PageCodec::kFast, PageCodec::kSmall}) {
       config.codec = codec;
       disk_[codec] = test::bake(scene, config).bytes;

@@ -7,16 +7,17 @@
 namespace packtrace {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr uint32_t kMaxSubdivisions = 3; // subdivision levels here; the refiner adds its own
 // Maximum number of distances per triangle (source and simplified). Limits the time in soups, where every triangle is
 // near all others and more work gains little.
-constexpr size_t kWork = 400;
+constexpr size_t kWorkPerTriangle = 400;
 
 } // namespace
 
 bool UncoveredBound::spent() const {
-  return refiner_.work() > kWork * (source_.surface().triangles.size() + simplified_.surface().triangles.size());
+  return refiner_.work() >
+         kWorkPerTriangle * (source_.surface().triangles.size() + simplified_.surface().triangles.size());
 }
 
 void UncoveredBound::measure(uint32_t triangle, std::span<const uint32_t> found) {
@@ -113,7 +114,7 @@ double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, doubl
 /// @param least set to a lower bound of the part's largest distance from the candidates; unchanged if the overlay is
 /// enough
 double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, double& least) {
-  double by_overlay = kInfinite;
+  double by_overlay = kUnbounded;
   if (overlay(part, by_overlay) && (by_overlay <= error_.limit() || overlay_near(by_overlay))) {
     note_parts(triangle, mapped_triangles_);
     return by_overlay;
@@ -156,7 +157,7 @@ bool UncoveredBound::overlay_near(double& stated) {
 /// Bounds the part that measure_corners() was called for by subdivision.
 double UncoveredBound::refine() {
   refined_.clear();
-  double stated = source_.candidates().empty() ? kInfinite : 0.0;
+  double stated = source_.candidates().empty() ? kUnbounded : 0.0;
   refiner_.run([&](double distance, uint32_t t) { return error_.enough(distance, inherited_error(t)); },
                [&](uint32_t t, double distance) {
                  refined_.push_back({t, 0, distance});
