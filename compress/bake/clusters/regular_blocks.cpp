@@ -1,12 +1,11 @@
 #include "compress/bake/clusters/regular_blocks.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <utility>
 
+#include "compress/bake/clusters/block_cutter.h"
 #include "compress/format/cluster/grid_block.h"
 
 namespace packtrace {
@@ -21,32 +20,12 @@ constexpr uint32_t kDiagonalValence = 8, kPlainValence = 4;
 /// Maximum number of triangles at a vertex on the border of a grid.
 constexpr uint32_t kMaxBorderValence = 3, kMaxDiagonalBorderValence = 4, kMaxPlainBorderValence = 2;
 constexpr uint32_t kProbe = 512; ///< number of triangles from which the diagonals of a grid are chosen
-constexpr int32_t kBlockQuads = kMaxGridQuads;
-constexpr int32_t kMaxBlockColumns = 32;
-constexpr double kMaxElongation = 2.5; ///< maximum ratio of a block's sides, from mean edge lengths
-constexpr double kBlockCost = 8.0;     ///< cost of a block apart from its vertices; a vertex costs 1
-/// Fewer blocks than kFewBlocks must fill their part. Exactly kFewBlocks must hold kMinShareOfFew of its triangles.
-constexpr size_t kFewBlocks = 4;
-constexpr double kMinShareOfFew = 0.6;
-/// Factor of the cost where the number of columns is not a power of two. Powers of two divide symmetric shapes evenly,
-/// so that the positions of their blocks also repeat.
-constexpr double kOddCost = 1.05;
 /// Twice the number of quad edges at a vertex inside a grid, and its maximum on the border. An edge of a single
 /// triangle counts half.
 constexpr uint32_t kInnerSides = 8, kMaxBorderSides = 4;
 /// Limits of c^2 / (a^2 + b^2), where c is the longest edge of a triangle. The ratio is 1 in half of a rectangle.
 constexpr double kMinRightAngle = 0.8, kMaxRightAngle = 1.25;
 constexpr int32_t kMaxCoordinate = 1 << 24;
-
-/// A triangle's place in the grid.
-struct Place {
-  int32_t i = 0, j = 0; ///< column and row of its quad
-  bool upper = false;
-  uint8_t diagonal = 0; ///< of its quad
-  uint8_t first = 0;    ///< number of the triangle's corner that is corner 0 of the QuadTriangle
-
-  const QuadTriangle& shape() const { return kQuadTriangles[diagonal][upper ? 1 : 0]; }
-};
 
 /// How the diagonals of a grid lie: all alike, alternating, or each on the longest edge of its two triangles.
 enum class Diagonals { kEqual, kAlternating, kLongestEdges };
@@ -68,31 +47,15 @@ QuadEdge opposite(QuadEdge edge) {
   return QuadEdge::kDiagonal;
 }
 
-/// How parts are cut into blocks.
-struct CutRule {
-  double min_share;    ///< minimum share of a part's triangles in blocks
-  double rest_cost;    ///< cost of a triangle outside all blocks
-  int32_t small_quads; ///< number of quads of a small block; 0: no small blocks
-};
-constexpr CutRule kCutMostly{0.6, 1.0, 0}, kCutPartly{0.3, 1.5, kBlockQuads / 2};
-
 struct Neighbour {
   uint32_t triangle;
-  Place place;
-};
-
-struct Size {
-  int32_t columns, rows;
-
-  int32_t quads() const { return columns * rows; }
-  int32_t points() const { return (columns + 1) * (rows + 1); }
+  GridPlace place;
 };
 
 class BlockFinder {
 public:
   BlockFinder(const QuantizedGeometry& geometry, RepeatedClusters which)
-      : geometry_(geometry), cut_(which == RepeatedClusters::kMost ? kCutPartly : kCutMostly),
-        valence_(geometry.vertices.size(), 0) {}
+      : geometry_(geometry), valence_(geometry.vertices.size(), 0), cutter_(geometry, places_, which) {}
 
   std::vector<RegularBlock> run() {
     for (const Triangle& t : geometry_.triangles)
@@ -125,7 +88,7 @@ private:
       const std::optional<uint32_t> first = begin(seed);
       if (!first) continue;
       grow(seed, *first, ~0u);
-      cut_blocks();
+      cutter_.cut(part_, diagonals_ == Diagonals::kAlternating, blocks_);
     }
   }
 
@@ -170,7 +133,8 @@ private:
     for (size_t t = 0; t < count; ++t) {
       const Triangle& triangle = geometry_.triangles[t];
       std::array<double, 3> squares{};
-      for (int e = 0; e < 3; ++e) squares[static_cast<size_t>(e)] = squared_length(triangle[e], triangle[(e + 1) % 3]);
+      for (int e = 0; e < 3; ++e)
+        squares[static_cast<size_t>(e)] = squared_edge(geometry_, triangle[e], triangle[(e + 1) % 3]);
       const auto longest = std::ranges::max_element(squares);
       longest_[t] = static_cast<uint8_t>(longest - squares.begin());
       const double others = squares[0] + squares[1] + squares[2] - *longest;
@@ -192,16 +156,6 @@ private:
       return sides_[vertex] == kInnerSides || sides_[vertex] <= kMaxBorderSides;
     };
     return fits(t.x) && fits(t.y) && fits(t.z);
-  }
-
-  double squared_length(uint32_t from, uint32_t to) const {
-    const LatticePoint &a = place_of(from), &b = place_of(to);
-    double sum = 0.0;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const auto d = static_cast<double>(b[axis] - a[axis]);
-      sum += d * d;
-    }
-    return sum;
   }
 
   /// Returns whether the triangle may be half of a quad in a grid whose diagonals are longest edges. Its longest edge
@@ -236,7 +190,7 @@ private:
 
   /// Returns whether the triangle fits its place: its longest edge is the diagonal, or its corners have the numbers of
   /// triangles that a grid with these diagonals has there.
-  bool is_regular(uint32_t triangle, const Place& place) const {
+  bool is_regular(uint32_t triangle, const GridPlace& place) const {
     if (diagonals_ == Diagonals::kEqual) return is_uniform(triangle);
     if (diagonals_ == Diagonals::kLongestEdges)
       return (place.first + place.shape().find(QuadEdge::kDiagonal)) % 3 == longest_[triangle] &&
@@ -285,10 +239,10 @@ private:
   /// Returns the triangle across an edge, and its place in the grid. Returns nothing if that triangle is not regular or
   /// was visited before.
   std::optional<Neighbour> enter(uint32_t triangle, QuadEdge edge) const {
-    const Place& from = places_[triangle];
+    const GridPlace& from = places_[triangle];
     const auto found = across(triangle, from.first + from.shape().find(edge));
     if (!found || visited_[found->first] != 0) return std::nullopt;
-    Place to{from.i, from.j, edge == QuadEdge::kDiagonal && !from.upper, from.diagonal, 0};
+    GridPlace to{from.i, from.j, edge == QuadEdge::kDiagonal && !from.upper, from.diagonal, 0};
     if (edge == QuadEdge::kRight) ++to.i;
     if (edge == QuadEdge::kLeft) --to.i;
     if (edge == QuadEdge::kAbove) ++to.j;
@@ -316,7 +270,7 @@ private:
     return next->triangle;
   }
 
-  void visit(uint32_t triangle, const Place& place) {
+  void visit(uint32_t triangle, const GridPlace& place) {
     places_[triangle] = place;
     visited_[triangle] = 1;
     part_.push_back(triangle);
@@ -345,189 +299,28 @@ private:
     }
   }
 
-  const LatticePoint& place_of(uint32_t vertex) const {
-    return geometry_.positions[geometry_.vertices[vertex].position];
-  }
-
-  /// Returns the mean squared length of the part's edges along rows, along columns, and of the diagonals.
-  std::array<double, 3> mean_squares() const {
-    std::array<double, 3> sums{};
-    double count = 0.0;
-    for (const uint32_t t : part_) {
-      if (places_[t].upper) continue;
-      ++count;
-      for (uint32_t e = 0; e < 3; ++e) {
-        const QuadEdge edge = places_[t].shape().edges[e];
-        sums[edge == QuadEdge::kDiagonal ? 2
-             : edge == QuadEdge::kBelow  ? 0
-                                         : 1] +=
-            squared_length(corner(t, places_[t].first + e), corner(t, places_[t].first + e + 1));
-      }
-    }
-    for (double& sum : sums) sum /= std::max(count, 1.0);
-    return sums;
-  }
-
   /// Returns the corner of the seed that must come first to make diagonals of the longest of the three edge directions
   /// around the seed. Returns nothing if its part is too small for a block.
   std::optional<uint32_t> corner_off_diagonals(uint32_t seed) {
     grow(seed, 0, kProbe);
     if (part_.size() < kMaxClusterTriangles) return std::nullopt;
-    const std::array<double, 3> squares = mean_squares();
+    const std::array<double, 3> squares = mean_squared_edges(geometry_, part_, places_);
     for (const uint32_t t : part_) visited_[t] = 0;
     const auto longest = static_cast<uint32_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());
     return (longest + 1) % 3; // the diagonal is edge 2
   }
 
-  /// Returns the block size of the least estimated cost. Returns nothing if all sizes exceed kMaxElongation.
-  std::optional<Size> choose_size() const {
-    const std::array<double, 3> squares = mean_squares();
-    std::optional<Size> best;
-    double least = 0.0;
-    const auto consider = [&](Size size) {
-      if (diagonals_ == Diagonals::kAlternating && size.columns % 2 != 0)
-        return; // odd sizes would give blocks of two kinds
-      if (diagonals_ == Diagonals::kAlternating) size.rows -= size.rows % 2;
-      const double width = size.columns * std::sqrt(squares[0]), height = size.rows * std::sqrt(squares[1]);
-      if (size.rows < 2 || width > kMaxElongation * height || height > kMaxElongation * width) return;
-      uint32_t blocks = 0;
-      for_each_full_block({static_cast<int32_t>(diagonal(lowest_[0], lowest_[1])), 0}, size,
-                          [&](int32_t, int32_t) { ++blocks; });
-      const double rest = static_cast<double>(part_.size()) - 2.0 * size.quads() * blocks;
-      const bool odd = !std::has_single_bit(static_cast<uint32_t>(size.columns));
-      const double cost = (cut_.rest_cost * rest + blocks * (kBlockCost + size.points())) * (odd ? kOddCost : 1.0);
-      if (!best || cost < least) best = size, least = cost;
-    };
-    for (int32_t columns = 2; columns <= kMaxBlockColumns; ++columns) consider({columns, kBlockQuads / columns});
-    // Small blocks save little where the part is too narrow for two of them side by side.
-    for (int32_t columns = 2; columns <= cut_.small_quads / 2; ++columns) {
-      const Size size{columns, cut_.small_quads / columns};
-      if (area_.columns >= 2 * size.columns && area_.rows >= 2 * size.rows) consider(size);
-    }
-    return best;
-  }
-
-  /// Cuts the part into blocks, unless they would hold too few of its triangles.
-  void cut_blocks() {
-    if (part_.size() < kMaxClusterTriangles) return;
-    Place lo = places_[part_[0]], hi = lo;
-    for (const uint32_t t : part_) {
-      lo.i = std::min(lo.i, places_[t].i), lo.j = std::min(lo.j, places_[t].j);
-      hi.i = std::max(hi.i, places_[t].i), hi.j = std::max(hi.j, places_[t].j);
-    }
-    lowest_ = {lo.i, lo.j};
-    area_ = {hi.i - lo.i + 1, hi.j - lo.j + 1};
-    const uint64_t cells = static_cast<uint64_t>(area_.columns) * static_cast<uint64_t>(area_.rows);
-    if (cells > 16 * part_.size()) return;
-    quads_.assign(static_cast<size_t>(cells), {kNothing, kNothing});
-    for (const uint32_t t : part_) {
-      const Place& place = places_[t];
-      uint32_t& cell = quads_[cell_of(place.i - lo.i, place.j - lo.j)][place.upper ? 1 : 0];
-      if (cell == kNothing) cell = t; // else the grid winds over itself
-    }
-    sum_full_quads();
-    const std::optional<Size> chosen = choose_size();
-    if (!chosen) return;
-    const Size size = *chosen;
-    Size best{0, 0};
-    size_t most = 0;
-    for (int32_t y = 0; y < size.rows; ++y)
-      for (int32_t x = 0; x < size.columns; ++x) {
-        if (diagonal(lowest_[0] + x, lowest_[1] + y) != 0) continue; // a block begins with diagonal 0
-        size_t count = 0;
-        for_each_full_block({x, y}, size, [&](int32_t, int32_t) { ++count; });
-        if (count > most) most = count, best = {x, y};
-      }
-    // The triangles between blocks make poor clusters, and a few blocks save too little to make up for it.
-    const double share = 2.0 * static_cast<double>(most) * size.quads() / static_cast<double>(part_.size());
-    const double min_share = most > kFewBlocks ? cut_.min_share : most == kFewBlocks ? kMinShareOfFew : 1.0;
-    if (share < min_share) return;
-    for_each_full_block(best, size, [&](int32_t x, int32_t y) { add_block(x, y, size); });
-  }
-
-  size_t cell_of(int32_t x, int32_t y) const {
-    return static_cast<size_t>(y) * static_cast<size_t>(area_.columns) + static_cast<size_t>(x);
-  }
-
-  /// Computes full_[x, y]: the number of quads left of column x and below row y that have both triangles.
-  void sum_full_quads() {
-    const size_t stride = static_cast<size_t>(area_.columns) + 1;
-    full_.assign(stride * (static_cast<size_t>(area_.rows) + 1), 0);
-    for (int32_t y = 0; y < area_.rows; ++y) {
-      uint32_t row = 0;
-      for (int32_t x = 0; x < area_.columns; ++x) {
-        const auto& quad = quads_[cell_of(x, y)];
-        row += quad[0] != kNothing && quad[1] != kNothing;
-        const size_t at = static_cast<size_t>(y) * stride + static_cast<size_t>(x);
-        full_[at + stride + 1] = full_[at + 1] + row;
-      }
-    }
-  }
-
-  template <class Use>
-  void for_each_full_block(Size offset, Size size, const Use& use) const {
-    const size_t stride = static_cast<size_t>(area_.columns) + 1;
-    const auto full = [&](int32_t x, int32_t y) {
-      return full_[static_cast<size_t>(y) * stride + static_cast<size_t>(x)];
-    };
-    for (int32_t y = offset.rows; y + size.rows <= area_.rows; y += size.rows)
-      for (int32_t x = offset.columns; x + size.columns <= area_.columns; x += size.columns) {
-        const int32_t right = x + size.columns, top = y + size.rows;
-        if (full(right, top) - full(x, top) - full(right, y) + full(x, y) == static_cast<uint32_t>(size.quads()))
-          use(x, y);
-      }
-  }
-
-  /// Adds the block whose lowest cell is (x, y).
-  void add_block(int32_t x, int32_t y, Size size) {
-    if (!has_grid_vertices(x, y, size)) return;
-    RegularBlock& block = blocks_.emplace_back();
-    GridBlock shape{static_cast<uint32_t>(size.columns), static_cast<uint32_t>(size.rows), 0};
-    for (int32_t j = 0; j < size.rows; ++j)
-      for (int32_t i = 0; i < size.columns; ++i)
-        shape.diagonals |= uint64_t{places_[quads_[cell_of(x + i, y + j)][0]].diagonal} << (j * size.columns + i);
-    for (const GridTriangle& one : strip_order(shape)) {
-      const uint32_t t =
-          quads_[cell_of(x + static_cast<int32_t>(one.x), y + static_cast<int32_t>(one.y))][one.upper ? 1 : 0];
-      block.triangles[block.triangle_count] = t;
-      block.first_corner[block.triangle_count++] = places_[t].first;
-    }
-  }
-
-  /// Returns whether all triangles of the block that meet at a grid point share one vertex there.
-  bool has_grid_vertices(int32_t x, int32_t y, Size size) const {
-    std::array<uint32_t, size_t{3} * (kMaxBlockColumns + 1)> vertices; // a block of 2 x 32 quads has the most points
-    vertices.fill(kNothing);
-    for (int32_t j = 0; j < size.rows; ++j)
-      for (int32_t i = 0; i < size.columns; ++i)
-        for (const uint32_t t : quads_[cell_of(x + i, y + j)]) {
-          const QuadTriangle& shape = places_[t].shape();
-          for (uint32_t c = 0; c < 3; ++c) {
-            const int32_t column = i + shape.corners[c][0], row = j + shape.corners[c][1];
-            uint32_t& known = vertices[static_cast<size_t>(row * (size.columns + 1) + column)];
-            const uint32_t vertex = corner(t, places_[t].first + c);
-            if (known != kNothing && known != vertex) return false;
-            known = vertex;
-          }
-        }
-    return true;
-  }
-
   const QuantizedGeometry& geometry_;
-  CutRule cut_;
   std::vector<uint32_t> valence_;        ///< per vertex: number of triangles
   std::vector<uint32_t> first_, around_; ///< triangles of vertex v: around_[first_[v]..first_[v+1])
-  std::vector<Place> places_;            ///< per triangle, valid if visited
+  std::vector<GridPlace> places_;        ///< per triangle, valid if visited
   std::vector<uint8_t> visited_;
   std::vector<uint32_t>
       sides_; ///< per vertex: twice its number of edges other than diagonals, if these are longest edges
   std::vector<uint8_t> longest_; ///< per triangle: number of its longest edge; empty unless diagonals are longest edges
   std::vector<uint32_t> part_;   ///< triangles of the connected part being cut
   Diagonals diagonals_ = Diagonals::kEqual; ///< of the part
-  std::array<int32_t, 2> lowest_{};         ///< least column and row of the part
-  Size area_{};
-  std::vector<std::array<uint32_t, 2>> quads_; ///< per cell: lower and upper triangle
-  std::vector<uint32_t> full_;
+  BlockCutter cutter_;
   std::vector<RegularBlock> blocks_;
 };
 

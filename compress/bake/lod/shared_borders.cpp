@@ -9,12 +9,12 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
+#include "compress/bake/lod/simplify/surface_edges.h"
 #include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 namespace {
 
-constexpr double kFolded = 0.9999; // minimum cosine between the layers of a sheet
 constexpr size_t kBorderGrain = 2048;
 
 /// A hash that is equal for equal positions on any lattice: each coordinate is reduced to an odd mantissa and an

@@ -17,7 +17,6 @@ constexpr double kSeamWeight = 2.0;    // at material seams
 constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates are discontinuous
 constexpr double kSharp = 0.3;         // maximum cosine between the triangles of a sharp edge
 constexpr double kSharpWeight = 0.25;  // keeps the outline of thin plates, whose rims have hardly any area
-constexpr double kFolded = 0.9999;     // minimum cosine between the layers of a sheet
 // of the point's own position: on flat parts, collapses short edges first and avoids long triangles. 1e-4 of an edge's
 // length counts as much as that distance from the surface.
 constexpr double kStayWeight = 1e-8;

@@ -8,6 +8,9 @@
 
 namespace packtrace {
 
+/// Minimum cosine between the layers of a sheet.
+inline constexpr double kFolded = 0.9999;
+
 /// The edges of a surface and the quadrics of its points.
 struct SurfaceEdges {
   std::vector<EdgeEnds> ends;        ///< a < b
