@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "assets/generator/displaced_mesh.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/import_scene.h"
 #include "tests/benchmarks/benchmark_options.h"
 #include "tests/benchmarks/packing_benchmark_grids.h"
@@ -75,6 +76,8 @@ PackingInput load_packing_input(const std::string& name, const std::filesystem::
                                 [&](const Shape& a, const Shape& b) { return size(a) < size(b); })};
   }
   input.mesh = merge_world(input.scene);
+  if (input.mesh.triangles.empty())
+    throw Error(ErrorKind::kInput, main_file.string() + ": no triangles outside objects");
   return input;
 }
 

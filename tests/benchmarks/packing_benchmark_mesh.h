@@ -33,7 +33,8 @@ Mesh weld_positions(const Mesh& mesh);
 
 /// Returns an input by name: "generated" (packtrace_scenegen's displaced mesh, a ring of eroded rock with vertex
 /// normals), one of grid_input_names(), "bunny", "spaceship" or "house" (a folder of `scenes`), or a scene or mesh
-/// file. The scene's world is merged. The bunny is loaded without the plane below it. Throws like import_scene().
+/// file. The scene's world is merged. The bunny is loaded without the plane below it. Throws like import_scene(), and
+/// Error(kInput) if the world has no triangles.
 PackingInput find_packing_input(const std::string& name, const std::filesystem::path& scenes,
                                 uint64_t generated_triangles);
 
