@@ -8,6 +8,12 @@ namespace packtrace {
 namespace {
 
 constexpr size_t kHeapBlock = 24u << 20; // larger ones might be mapped separately
+// Sanitizers replace malloc: theirs serves no other allocation from a freed block, and writes to each new one.
+#ifdef PACKTRACE_SANITIZED
+constexpr bool kMallocKeepsBlocks = false;
+#else
+constexpr bool kMallocKeepsBlocks = true;
+#endif
 
 } // namespace
 
@@ -23,6 +29,7 @@ void prefer_large_pages(void* memory, size_t bytes) {
 
 /// Allocates large blocks and frees them untouched: malloc keeps them and serves other allocations from them.
 void prefer_large_heap_pages(size_t bytes) {
+  if (!kMallocKeepsBlocks) return;
   std::vector<void*> blocks((bytes + kHeapBlock - 1) / kHeapBlock);
   for (void*& block : blocks) {
     block = std::malloc(kHeapBlock);

@@ -15,13 +15,6 @@ constexpr size_t kOwnBytes = 240u << 20;   // of the calling thread: enough for 
 constexpr size_t kWorkerBytes = 48u << 20; // of each worker; glibc limits a worker's heap to 64 MiB
 constexpr uint32_t kMaxWorkers = 15;       // workers with large pages; each may use 6 MiB more memory than without
 
-// Sanitizers replace malloc: theirs serves no other allocation from a freed block, and writes to each new one.
-#ifdef PACKTRACE_SANITIZED
-constexpr bool kMallocKeepsBlocks = false;
-#else
-constexpr bool kMallocKeepsBlocks = true;
-#endif
-
 /// By default, glibc returns large blocks to the kernel, which then has to clear every page of the next frame's
 /// buffers: that took an eighth of the time of moving frames.
 void keep_freed_memory() {
@@ -51,7 +44,6 @@ private:
 } // namespace
 
 void prepare_heaps() {
-  if (!kMallocKeepsBlocks) return;
   // Never destroyed: workers may still enter the scheduler when main() has returned.
   static const WorkerObserver* const observer = [] {
     keep_freed_memory();
