@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "compress/format/layout/baked_format.h"
+#include "pbrt_import/base/disjoint_sets.h"
 #include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
@@ -108,37 +108,28 @@ private:
     });
   }
 
-  uint32_t region(uint32_t position) {
-    while (joined_[position] != position) position = joined_[position] = joined_[joined_[position]];
-    return position;
-  }
-
   /// Joins the positions of each flat triangle.
   void find_regions() {
-    joined_.resize(surface_.positions.size());
-    std::iota(joined_.begin(), joined_.end(), 0u);
+    regions_ = DisjointSets(surface_.positions.size());
     for_each_triangle([&](QuantizedPart& part, size_t i) {
       if (part.flat[i] == 0) return;
-      for (int k = 1; k < 3; ++k) {
-        const uint32_t a = region(part.corners[i][0]), b = region(part.corners[i][k]);
-        joined_[std::max(a, b)] = std::min(a, b);
-      }
+      for (int k = 1; k < 3; ++k) regions_.join(part.corners[i][0], part.corners[i][k]);
     });
   }
 
   /// Marks the triangles of regions that save no bits as smooth.
   void drop_regions() {
     find_regions();
-    std::vector<double> saved(joined_.size()); // by the position that is the root of a region
+    std::vector<double> saved(regions_.count()); // by the position that is the root of a region
     for (const Vertex& v : vertices_)
       if (v.use == kByFlat)
-        saved[region(v.position)] +=
+        saved[regions_.root(v.position)] +=
             v.normal != kNoNormal ? bits_.position + bits_.normal : kThinnerBits - bits_.position;
     double all = 0.0;
     for (const double bits : saved) all += std::max(bits, 0.0);
     const bool none = all < kClusterBits;
     for_each_triangle([&](QuantizedPart& part, size_t i) {
-      if (part.flat[i] != 0 && (none || saved[region(part.corners[i][0])] <= 0.0)) part.flat[i] = 0;
+      if (part.flat[i] != 0 && (none || saved[regions_.root(part.corners[i][0])] <= 0.0)) part.flat[i] = 0;
     });
   }
 
@@ -148,7 +139,7 @@ private:
   std::vector<uint8_t> use_;     // per position
   std::vector<Vertex> vertices_; // distinct
   WeldTable table_{1};
-  std::vector<uint32_t> joined_; // per position: parent in the union-find forest of regions
+  DisjointSets regions_; // of positions
 };
 
 } // namespace

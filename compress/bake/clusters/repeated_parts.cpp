@@ -14,6 +14,7 @@
 #include "compress/bake/clusters/triangle_cutter.h"
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/trees/node_groups.h"
+#include "pbrt_import/base/disjoint_sets.h"
 
 namespace packtrace {
 namespace {
@@ -42,7 +43,7 @@ struct Components {
 class ComponentFinder {
 public:
   ComponentFinder(const QuantizedGeometry& geometry, std::span<const uint8_t> taken)
-      : g_(geometry), taken_(taken), parents_(geometry.positions.size()), component_of_(geometry.positions.size()) {}
+      : g_(geometry), taken_(taken), connected_(geometry.positions.size()), component_of_(geometry.positions.size()) {}
 
   Components run() {
     std::vector<uint32_t> triangles(g_.triangles.size());
@@ -62,24 +63,19 @@ private:
     return g_.vertices[g_.triangles[triangle][corner]].position;
   }
 
-  uint32_t root(uint32_t position) {
-    while (parents_[position] != position) position = parents_[position] = parents_[parents_[position]];
-    return position;
-  }
-
   /// Adds the components of all triangles of a kind.
   /// @param begin where they begin in Components::triangles
   void add_kind(std::span<const uint32_t> triangles, uint32_t begin) {
     for (const uint32_t t : triangles)
       for (int corner = 0; corner < 3; ++corner) {
         const uint32_t p = position(t, corner);
-        parents_[p] = p, component_of_[p] = kNoPart;
+        connected_.reset(p), component_of_[p] = kNoPart;
       }
     for (const uint32_t t : triangles)
-      for (int corner = 1; corner < 3; ++corner) parents_[root(position(t, corner))] = root(position(t, 0));
+      for (int corner = 1; corner < 3; ++corner) connected_.join(position(t, 0), position(t, corner));
     const size_t first = out_.list.size();
     for (const uint32_t t : triangles) {
-      uint32_t& number = component_of_[root(position(t, 0))];
+      uint32_t& number = component_of_[connected_.root(position(t, 0))];
       if (number == kNoPart) number = static_cast<uint32_t>(out_.list.size()), out_.list.emplace_back();
       Component& component = out_.list[number];
       ++component.end, component.free += taken_[t] == 0; // `end` is a count until all are counted
@@ -89,12 +85,14 @@ private:
       component.begin = component.end = begin;
       begin += count;
     }
-    for (const uint32_t t : triangles) out_.triangles[out_.list[component_of_[root(position(t, 0))]].end++] = t;
+    for (const uint32_t t : triangles)
+      out_.triangles[out_.list[component_of_[connected_.root(position(t, 0))]].end++] = t;
   }
 
   const QuantizedGeometry& g_;
   const std::span<const uint8_t> taken_;
-  std::vector<uint32_t> parents_, component_of_; ///< per position; the latter of roots
+  DisjointSets connected_;             ///< positions
+  std::vector<uint32_t> component_of_; ///< per position, valid for roots
   Components out_;
 };
 

@@ -15,8 +15,9 @@ struct RepeatedPart {
 };
 
 /// Finds parts of a mesh that repeat, such as the chairs of a room: components with equal connectivity in file order.
-/// The first of them is cut into clusters, the others are cut alike, and all have strips of the same triangles. So a
-/// compressed page stores their topology once, and coordinates once along each axis in which a part is only moved.
+/// The first of them is cut into clusters. The others are divided into clusters of the corresponding triangles, in the
+/// same order. So a compressed page stores their topology once, and coordinates once along each axis in which a part is
+/// only moved.
 /// Parts are listed by connectivity, then by the size of their boxes, because copies that are not rotated have equal
 /// sizes. Left out are parts of fewer than 32 or more than 2^14 triangles, and those for which the clusters of the
 /// first are much larger than for itself.

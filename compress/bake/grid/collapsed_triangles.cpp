@@ -1,9 +1,9 @@
 #include "compress/bake/grid/collapsed_triangles.h"
+#include "pbrt_import/base/disjoint_sets.h"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <numeric>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -40,11 +40,11 @@ public:
     std::vector<uint8_t> borders(slivers_.size());
     for (size_t i = 0; i < edges_.size(); ++i)
       if (odd_[i] != 0 && has_neighbour_[i] != 0) {
-        uint8_t& count = borders[piece(sliver_at_[i])];
+        uint8_t& count = borders[pieces_.root(sliver_at_[i])];
         count = std::min<uint8_t>(count + 1, 2);
       }
     for (uint32_t i = 0; i < slivers_.size(); ++i)
-      if (borders[piece(i)] > 1) collapsed[slivers_[i]] = 0;
+      if (borders[pieces_.root(i)] > 1) collapsed[slivers_[i]] = 0;
   }
 
 private:
@@ -58,22 +58,15 @@ private:
         at_sliver_[triangles_[slivers_[i]][side]] = 1;
       }
     tbb::parallel_sort(sides.begin(), sides.end());
-    joined_.resize(slivers_.size());
-    std::iota(joined_.begin(), joined_.end(), 0u);
+    pieces_ = DisjointSets(slivers_.size());
     for (size_t i = 0; i < sides.size(); ++i) {
       if (i == 0 || sides[i].first != sides[i - 1].first) {
         edges_.push_back(sides[i].first), sliver_at_.push_back(sides[i].second), odd_.push_back(0);
       } else {
-        const uint32_t a = piece(sides[i].second), b = piece(sides[i - 1].second);
-        joined_[std::max(a, b)] = std::min(a, b);
+        pieces_.join(sides[i].second, sides[i - 1].second);
       }
       odd_.back() ^= 1;
     }
-  }
-
-  uint32_t piece(uint32_t sliver) {
-    while (joined_[sliver] != sliver) sliver = joined_[sliver] = joined_[joined_[sliver]];
-    return sliver;
   }
 
   /// Finds the sliver edges that also belong to triangles with area.
@@ -96,7 +89,7 @@ private:
   const std::span<const uint8_t> shapes_;
   std::vector<uint8_t> at_sliver_;     // per point: whether it is a corner of a sliver
   std::vector<uint32_t> slivers_;      // triangle numbers
-  std::vector<uint32_t> joined_;       // per sliver: parent in the union-find forest of pieces
+  DisjointSets pieces_;                // of slivers
   std::vector<Edge> edges_;            // edges of slivers, ascending
   std::vector<uint32_t> sliver_at_;    // per edge: a sliver with this edge
   std::vector<uint8_t> odd_;           // per edge: whether it belongs to an odd number of slivers

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <vector>
 
 #include "compress/bake/lod/bound/triangle_distance.h"
 #include "compress/bake/lod/bound/triangle_set.h"
+#include "pbrt_import/base/disjoint_sets.h"
 
 namespace packtrace {
 namespace {
@@ -75,21 +75,13 @@ private:
   }
 
   void find_pieces() {
-    std::vector<uint32_t> parent(m_.points.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto root = [&](uint32_t p) {
-      while (parent[p] != p) p = parent[p] = parent[parent[p]];
-      return p;
-    };
+    DisjointSets connected(m_.points.size());
     for (const LodTriangle& t : m_.triangles)
-      for (int i = 1; i < 3; ++i) {
-        const uint32_t a = root(t.points[0]), b = root(t.points[i]);
-        parent[std::max(a, b)] = std::min(a, b);
-      }
+      for (int i = 1; i < 3; ++i) connected.join(t.points[0], t.points[i]);
     std::vector<uint32_t> piece_of(m_.points.size(), kNoPiece);
     for (uint32_t i = 0; i < m_.triangles.size(); ++i) {
       const LodTriangle& t = m_.triangles[i];
-      uint32_t& number = piece_of[root(t.points[0])];
+      uint32_t& number = piece_of[connected.root(t.points[0])];
       if (number == kNoPiece) number = static_cast<uint32_t>(pieces_.size()), pieces_.emplace_back();
       Piece& piece = pieces_[number];
       piece.triangles.push_back(i);

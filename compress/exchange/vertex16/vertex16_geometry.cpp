@@ -4,11 +4,11 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 
 #include "compress/exchange/vertex16/vertex16_fields.h"
 #include "compress/format/cluster/tangent_codec.h"
+#include "pbrt_import/base/disjoint_sets.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/weld_table.h"
 #include "pbrt_import/scene/angle.h"
@@ -164,22 +164,14 @@ private:
 
   /// Subtracts from each chart (vertices connected by triangles) the integer tile of its smallest coordinates.
   void move_charts_to_the_first_tile() {
-    std::vector<uint32_t> parent(vertices_.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto root = [&](uint32_t v) {
-      while (parent[v] != v) v = parent[v] = parent[parent[v]];
-      return v;
-    };
+    DisjointSets charts(vertices_.size());
     for (size_t i = 0; i < out_.indices.size(); i += 3)
-      for (size_t corner = 1; corner < 3; ++corner) {
-        const uint32_t a = root(out_.indices[i]), b = root(out_.indices[i + corner]);
-        parent[std::max(a, b)] = std::min(a, b);
-      }
+      for (size_t corner = 1; corner < 3; ++corner) charts.join(out_.indices[i], out_.indices[i + corner]);
     std::vector<Vec2> tile(vertices_.size(), Vec2(std::numeric_limits<float>::infinity()));
     for (uint32_t v = 0; v < vertices_.size(); ++v)
-      tile[root(v)] = glm::min(tile[root(v)], glm::floor(vertices_[v].uv));
+      tile[charts.root(v)] = glm::min(tile[charts.root(v)], glm::floor(vertices_[v].uv));
     tile_.reserve(vertices_.size());
-    for (uint32_t v = 0; v < vertices_.size(); ++v) tile_.push_back(tile[root(v)]);
+    for (uint32_t v = 0; v < vertices_.size(); ++v) tile_.push_back(tile[charts.root(v)]);
   }
 
   glm::dvec2 tiled_uv(uint32_t v) const {
